@@ -1,0 +1,1 @@
+"""The Python side of Meniscus: data (fluid), rendering, files (output) and Blender."""

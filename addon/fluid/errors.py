@@ -1,0 +1,21 @@
+"""The errors that a user can act on. Each message is one sentence: what is wrong and what to do."""
+
+
+class MeniscusError(Exception):
+    """Base of all errors whose message is meant for the user."""
+
+
+class InputError(MeniscusError, ValueError):
+    """The scene, the arrays or the options cannot be used as given."""
+
+
+class DeviceError(MeniscusError):
+    """The graphics device or its driver cannot do what was asked."""
+
+
+class OutputError(MeniscusError):
+    """A file cannot be written or read."""
+
+
+class CancelledError(MeniscusError):
+    """The user cancelled the work."""

@@ -1,0 +1,62 @@
+"""The density field whose isosurface is the fluid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+from .kernels import KERNELS, Kernel
+
+
+@dataclass(frozen=True)
+class Field:
+    """The surface is where ``sum_i q_i f(x_i) = isovalue``.
+
+    Parameters
+    ----------
+    kernel
+        Name of a density kernel, see :data:`kernels.KERNELS`.
+    isovalue
+        The threshold T, greater than 0. A lone ball of weight 1 is visible for T < 1.
+
+    Raises
+    ------
+    InputError
+        The kernel is unknown or the isovalue is not a positive finite number.
+    """
+
+    kernel: str = "wyvill"
+    isovalue: float = 0.2
+
+    def __post_init__(self) -> None:
+        if self.kernel not in KERNELS:
+            raise InputError(f"Unknown kernel '{self.kernel}': choose one of {', '.join(KERNELS)}")
+        if not (math.isfinite(self.isovalue) and self.isovalue > 0):
+            raise InputError(f"The isovalue must be a positive number, not {self.isovalue}")
+
+    @property
+    def density_kernel(self) -> Kernel:
+        """The kernel itself."""
+        return KERNELS[self.kernel]
+
+    def kernel_radii(self, radii: npt.NDArray[np.floating], weights: npt.NDArray[np.floating]) -> npt.NDArray[np.float64]:
+        """Radii of the kernel spheres, the isosurfaces that the balls would have alone.
+
+        Parameters
+        ----------
+        radii, weights
+            Influence radii and weights, shape (N,), world units and dimensionless.
+
+        Returns
+        -------
+        (N,) float64, world units; 0 where a ball alone has no surface. ``r0 = R sqrt(1 - x0)`` with
+        ``q f(x0) = T`` (Kanamori et al. 2008, section 5.2).
+        """
+        weights = np.asarray(weights, np.float64)
+        ratio = np.divide(self.isovalue, weights, out=np.full_like(weights, np.inf), where=weights > 0)
+        x0 = self.density_kernel.inverse(ratio)
+        return np.where(np.isnan(x0), 0.0, np.asarray(radii, np.float64) * np.sqrt(np.maximum(1 - x0, 0)))

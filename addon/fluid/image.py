@@ -1,0 +1,67 @@
+"""What rendering gives: named float images and a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .camera import Camera
+from .errors import InputError
+
+
+@dataclass
+class RenderInfo:
+    """How an image came about.
+
+    Attributes
+    ----------
+    method, backend, device
+        What rendered it.
+    milliseconds
+        Wall time by stage, in order.
+    counts
+        Numbers worth knowing: ``balls``, ``balls_drawn``, ``peels``, ``overflows`` ... as the method reports them.
+    dropped
+        Unusable balls by reason, see :class:`Balls`.
+    """
+
+    method: str = ""
+    backend: str = ""
+    device: str = ""
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return dict(vars(self))
+
+
+@dataclass
+class ImageBuffers:
+    """The passes of one image: float32, row 0 at the bottom; scalars (height, width), else (height, width, channels).
+
+    Attributes
+    ----------
+    camera
+        What the image shows.
+    passes
+        The images by pass name, see :data:`passes.PASSES`. Also reachable as ``image["depth"]``.
+    hit
+        (height, width) bool: where there is a surface.
+    info
+        How the image came about.
+    """
+
+    camera: Camera
+    passes: dict[str, npt.NDArray[np.float32]]
+    hit: npt.NDArray[np.bool_]
+    info: RenderInfo
+
+    def __getitem__(self, name: str) -> npt.NDArray[np.float32]:
+        if name not in self.passes:
+            raise InputError(f"The image has no pass '{name}', only {', '.join(self.passes)}")
+        return self.passes[name]

@@ -1,0 +1,57 @@
+"""The passes: named images, with the names and channels that Blender gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .errors import InputError
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A named image.
+
+    Attributes
+    ----------
+    name
+        As in the Python interface.
+    blender_name, channels
+        As in Blender's multilayer files: ``ViewLayer.<blender_name>.<channel>``.
+    background
+        Value of every channel where there is no surface.
+    is_color
+        Colour (stored as half floats, colour managed) rather than data (stored as floats).
+    """
+
+    name: str
+    blender_name: str
+    channels: str
+    background: float
+    is_color: bool
+    description: str
+
+
+DEPTH_BACKGROUND = 1e10
+"""What Cycles writes into the Depth pass where there is nothing."""
+
+PASSES: dict[str, Pass] = {
+    image_pass.name: image_pass
+    for image_pass in (
+        Pass("combined", "Combined", "RGBA", 0.0, True, "Headlight shading, premultiplied alpha"),
+        Pass("depth", "Depth", "Z", DEPTH_BACKGROUND, False, "Planar distance from the camera, Blender units"),
+        Pass("normal", "Normal", "XYZ", 0.0, False, "Unit normal that points out of the fluid, world space"),
+        Pass("position", "Position", "XYZ", 0.0, False, "Position of the surface, world space"),
+    )
+}
+
+
+def checked_passes(names: Iterable[str]) -> tuple[str, ...]:
+    """`names` without repetition, in the order given; InputError names the first that is unknown."""
+    wanted = tuple(dict.fromkeys(names))
+    for name in wanted:
+        if name not in PASSES:
+            raise InputError(f"Unknown pass '{name}': choose from {', '.join(PASSES)}")
+    if not wanted:
+        raise InputError(f"No pass was asked for: choose from {', '.join(PASSES)}")
+    return wanted
