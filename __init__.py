@@ -1,0 +1,49 @@
+"""Meniscus: the blended surface of particle fluids, ray-cast straight from the particles.
+
+Inside Blender this package is an extension; in the development environment it imports as ``meniscus``. Nothing heavy is
+imported here: the names below load when they are first used, and ``register`` loads the Blender side.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Balls": ".addon.fluid.balls",
+    "Camera": ".addon.fluid.camera",
+    "Field": ".addon.fluid.field",
+    "ImageBuffers": ".addon.fluid.image",
+    "Look": ".addon.fluid.look",
+    "MeniscusError": ".addon.fluid.errors",
+    "methods": ".addon.render.registry",
+    "oracle": ".addon.render",
+    "render": ".addon.render.renderer",
+    "write_exr": ".addon.output.exr",
+}
+
+__all__ = [*_HOMES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    value = getattr(importlib.import_module(_HOMES[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def register() -> None:
+    """Called by Blender when the extension is enabled."""
+    from .addon import blender
+
+    blender.register()
+
+
+def unregister() -> None:
+    """Called by Blender when the extension is disabled."""
+    from .addon import blender
+
+    blender.unregister()
