@@ -9,6 +9,8 @@ from pathlib import Path
 from ..addon.fluid.errors import DeviceError
 
 ROOT = Path(__file__).parent
+# "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12: ..." (others): the source-string number comes first.
+_LOG_ENTRY = re.compile(r"^((?:ERROR: |WARNING: )?)(\d+)(?=[:(]\d+[:()])", re.MULTILINE)
 _INCLUDE = re.compile(r'^\s*#include "([^"]+)"\s*$')
 
 
@@ -45,7 +47,7 @@ class Source:
 
     def explain(self, log: str) -> str:
         """The compiler's `log` with file names in place of source-string numbers."""
-        return re.sub(r"\b(\d+)(?=[:(]\d+[):])", lambda match: self._file(int(match.group(1))), log)
+        return _LOG_ENTRY.sub(lambda match: match.group(1) + self._file(int(match.group(2))), log)
 
     def _file(self, number: int) -> str:
         return self.files[number] if number < len(self.files) else str(number)

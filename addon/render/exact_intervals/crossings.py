@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
@@ -14,6 +15,9 @@ from . import bernstein
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 Columns = TypeVar("Columns", bound="Pairs")
+
+# Memberships of balls in intervals that are worked on at once; some 300 bytes each.
+_MEMBERSHIPS_AT_ONCE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -57,8 +61,8 @@ class Pairs:
     entry: FloatArray
     exit: FloatArray
 
-    def where(self: Columns, keep: npt.NDArray[np.bool_]) -> Columns:
-        """The pairs for which `keep` holds."""
+    def where(self: Columns, keep: npt.NDArray[np.bool_] | IntArray | slice) -> Columns:
+        """The pairs that a mask, indices or a slice picks."""
         return type(self)(*(getattr(self, column.name)[keep] for column in fields(self)))
 
 
@@ -81,29 +85,46 @@ def cross(rays: Rays, spheres: Spheres, ray: IntArray, ball: IntArray) -> Pairs:
 
 def first_crossings(rays: Rays, spheres: Spheres, pairs: Pairs, field: Field) -> FloatArray:
     """Distance along each ray to where it first crosses the isosurface, either way; infinite where it does not; (count,)."""
-    inside = _starts_inside(rays, spheres, pairs, field)
+    inside = density(rays, spheres, pairs, rays.start, field) >= field.isovalue
     pairs = _before_kernel_spheres(rays, spheres, pairs, inside)
-    interval_ray, begin, end, member_of, member = _intervals(pairs)
-    densities = _densities(pairs.where(member), spheres, begin[member_of], end[member_of], field)
-    totals = np.stack([np.bincount(member_of, column, len(begin)) for column in densities.T], axis=1)
-    # Seen from outside the density rises to the isovalue, seen from inside it falls to it.
-    sign = np.where(inside[interval_ray], -1.0, 1.0)
-    root = bernstein.first_root(sign[:, None] * (totals - field.isovalue))
-    distance = np.where(np.isnan(root), np.inf, begin + root * (end - begin))
-    # A ray from inside may leave the last influence sphere without a root where rounding hides it.
     first = np.full(len(rays), np.inf)
-    np.minimum.at(first, interval_ray, distance)
+    for part in _parts(pairs, len(rays)):
+        interval_ray, distance = _crossings(spheres, part, inside, field)
+        np.minimum.at(first, interval_ray, distance)
     return np.where(first <= rays.end, first, np.inf)
 
 
-def _starts_inside(rays: Rays, spheres: Spheres, pairs: Pairs, field: Field) -> npt.NDArray[np.bool_]:
-    """Whether each ray starts inside the fluid."""
-    return density(rays, spheres, pairs, rays.start, field) >= field.isovalue
+def _parts(pairs: Pairs, ray_count: int) -> Iterator[Pairs]:
+    """The pairs in whole rays, few enough at a time: n balls on a ray have up to n^2 memberships in intervals."""
+    per_ray = np.bincount(pairs.ray, minlength=ray_count)
+    part_of_ray = np.cumsum(per_ray**2) // _MEMBERSHIPS_AT_ONCE
+    edges = np.flatnonzero(np.diff(part_of_ray[pairs.ray])) + 1
+    for begin, end in zip([0, *edges], [*edges, len(pairs.ray)], strict=True):
+        yield pairs.where(slice(begin, end))
+
+
+def _crossings(spheres: Spheres, pairs: Pairs, inside: npt.NDArray[np.bool_], field: Field) -> tuple[IntArray, FloatArray]:
+    """The first crossing in each interval: its ray and its distance, infinite where there is none; (I,) each."""
+    interval_ray, begin, end, member_of, member = _intervals(pairs)
+    densities = _densities(pairs.where(member), spheres, begin[member_of], end[member_of], field)
+    totals = np.stack([_sums(member_of, column, len(begin)) for column in densities.T], axis=1)
+    # Seen from outside the density rises to the isovalue, seen from inside it falls to it.
+    sign = np.where(inside[interval_ray], -1.0, 1.0)
+    root = bernstein.first_root(sign[:, None] * (totals - field.isovalue))
+    # Between crossings that coincide only some of their balls are counted: there is no interval.
+    missed = np.isnan(root) | (end <= begin)
+    return interval_ray, np.where(missed, np.inf, begin + root * (end - begin))
+
+
+def _sums(group: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """Sums of `values` by group, (count,)."""
+    # bincount of nothing gives integers.
+    return np.bincount(group, values, count).astype(np.float64, copy=False)
 
 
 def density(rays: Rays, spheres: Spheres, pairs: Pairs, t: FloatArray, field: Field) -> FloatArray:
     """The field at the distance `t` along each ray, (count,)."""
-    return np.bincount(pairs.ray, _shares(spheres, pairs, t, field), len(rays))
+    return _sums(pairs.ray, _shares(spheres, pairs, t, field), len(rays))
 
 
 def _shares(spheres: Spheres, pairs: Pairs, t: FloatArray, field: Field) -> FloatArray:
@@ -145,7 +166,7 @@ def _intervals(pairs: Pairs) -> tuple[IntArray, FloatArray, FloatArray, IntArray
     rank = np.empty(2 * count, np.intp)
     rank[order] = np.arange(2 * count)
     ray, t = ray[order], t[order]
-    # Interval k runs from crossing k to k + 1. One that would join two rays is covered by no pair, but must not look for a root.
+    # Interval k runs from crossing k to k + 1. One that would join two rays is empty.
     covered = rank[count:] - rank[:count]
     pair = np.repeat(np.arange(count), covered)
     offset = np.arange(len(pair)) - np.repeat(np.cumsum(covered) - covered, covered)
@@ -169,7 +190,7 @@ def normals(rays: Rays, spheres: Spheres, pairs: Pairs, t: FloatArray, field: Fi
     radius = spheres.radii[pairs.ball]
     x = 1 - np.einsum("ij,ij->i", from_center, from_center) / radius**2
     pull = spheres.weights[pairs.ball] * field.density_kernel.derivative(x) / radius**2
-    outward = np.stack([np.bincount(pairs.ray, pull * axis, len(rays)) for axis in from_center.T], axis=1)
+    outward = np.stack([_sums(pairs.ray, pull * axis, len(rays)) for axis in from_center.T], axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     return np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
 
@@ -180,6 +201,6 @@ def blended_colors(
     """(count, 3): the balls' colours weighted by their share of the density at `t`; 0 where `t` is infinite."""
     pairs = pairs.where(np.isfinite(t)[pairs.ray])
     share = np.maximum(_shares(spheres, pairs, t, field), 0)
-    total = np.bincount(pairs.ray, share, len(rays))
-    summed = np.stack([np.bincount(pairs.ray, share * channel[pairs.ball], len(rays)) for channel in colors.T], axis=1)
+    total = _sums(pairs.ray, share, len(rays))
+    summed = np.stack([_sums(pairs.ray, share * channel[pairs.ball], len(rays)) for channel in colors.T], axis=1)
     return np.divide(summed, total[:, None], out=np.zeros_like(summed), where=total[:, None] > 0)
