@@ -1,6 +1,6 @@
 """Builds the extension: dist/meniscus-VERSION.zip, with its wheels, by Blender's own packaging tool.
 
-    .venv/bin/python tools/build_extension.py
+.venv/bin/python tools/build_extension.py
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from project import CACHE, ToolError, command_line, fingerprint, locked, output_of, run
+from project import CACHE, ToolError, command_line, fingerprint, locked, output_of
 from system_packages import apt_install, is_root_on_debian
 
 STAMP = "meniscus-stamp"
@@ -75,7 +75,7 @@ def check_possible() -> None:
         raise ToolError("Debian's Blender is set up on x86_64 only; name this machine's own with BLENDER=/path/to/blender.")
     if not is_root_on_debian():
         raise ToolError(
-            "Debian's Blender needs root and apt-get (run as root on Debian or Ubuntu), or name an installed one: BLENDER=/path."
+            "Debian's Blender needs root on Debian or Ubuntu; an installed one can be named with BLENDER=/path/to/blender."
         )
     if shutil.which("debootstrap") is None:
         apt_install(["debootstrap", "debian-archive-keyring"])
@@ -91,7 +91,7 @@ def bootstrap(program: DebianBlender, folder: Path) -> None:
 
 def debian_mirror() -> list[str]:
     """The machine's own Debian mirror; empty where it has none, then debootstrap takes its default."""
-    if 'ID=debian' not in Path("/etc/os-release").read_text().replace('"', ""):
+    if "ID=debian" not in Path("/etc/os-release").read_text().replace('"', ""):
         return []
     folder = Path("/etc/apt")
     listings = [folder / "sources.list", *sorted(folder.glob("sources.list.d/*.list"))]
@@ -106,6 +106,7 @@ def install(program: DebianBlender, folder: Path) -> None:
     # Mirrors of the unstable release may be snapshots whose signature has expired.
     (folder / "etc/apt/apt.conf.d/90meniscus").write_text('Acquire::Check-Valid-Until "false";\n')
     shutil.copy("/etc/resolv.conf", folder / "etc/resolv.conf")
+    (folder / "etc/mtab").symlink_to("/proc/self/mounts")  # Blender looks for the mounted file systems there
     apt_get = ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq"]
     packages = [*PACKAGES, *program.packages]
     output_of(command_inside(folder, [*apt_get, "update"]))
@@ -122,7 +123,8 @@ def check_version(program: DebianBlender, folder: Path) -> None:
 def command_inside(folder: Path, command: Sequence[str]) -> list[str]:
     """The command line that runs `command` inside the system in `folder`."""
     clean = ["env", "-i", "HOME=/root", "LC_ALL=C.UTF-8", "PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"]
-    network = [f"{name}={value}" for name, value in os.environ.items() if name.lower() in ("http_proxy", "https_proxy", "no_proxy")]
+    proxies = ("http_proxy", "https_proxy", "no_proxy")
+    network = [f"{name}={value}" for name, value in os.environ.items() if name.lower() in proxies]
     namespace = ["unshare", "--mount", "--propagation", "private", "sh", "-c", ENTER]
     return [*namespace, str(folder), *clean, *network, *command]
 

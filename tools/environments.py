@@ -73,11 +73,8 @@ def make(environment: Environment, python: str, lock: Path) -> None:
     ensure_libraries()
     uv = ensure_uv()
     run([uv, "venv", "--quiet", "--clear", "--python", python, environment.folder], env=uv_variables())
-    run(
-        [uv, "pip", "install", "--quiet", "--require-hashes", "--no-deps", "--only-binary", ":all:", "-r", lock]
-        + ["--python", environment.python],
-        env=uv_variables(),
-    )
+    install = [uv, "pip", "install", "--quiet", "--require-hashes", "--no-deps", "--only-binary", ":all:"]
+    run([*install, "-r", lock, "--python", environment.python], env=uv_variables())
     if environment.package:
         link_package(environment, environment.package)
 
@@ -146,7 +143,7 @@ def make_plain_venv(folder: Path) -> None:
         )
     apt_install(["python3-venv"])
     if not try_venv(folder):
-        raise ToolError(f"{sys.executable} cannot make virtual environments, python3-venv installed: try PYTHON=/usr/bin/python3.")
+        raise ToolError(f"{sys.executable} cannot make virtual environments: set PYTHON to a Python 3 that can.")
 
 
 def try_venv(folder: Path) -> bool:

@@ -6,11 +6,11 @@ A new platform is a row in `PLATFORMS`, a new Python an entry in `PYTHONS`; `mak
 from __future__ import annotations
 
 import re
-import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
+import tomllib
 from environments import UV_FOLDER, ensure_uv
 from project import CACHE, REQUIREMENTS, ROOT, ToolError, fingerprint, locked, output_of
 

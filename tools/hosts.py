@@ -32,7 +32,7 @@ PYTEST_OPTIONS = ["-p", "no:cacheprovider"]
 
 @dataclass(frozen=True)
 class Stage:
-    """A folder that a Blender program can see: where it lies, how the program calls it, and the words that start the program."""
+    """A folder that a Blender program can see: where it lies, what it is called there, and how the program is started."""
 
     folder: Path
     path_inside: str
@@ -63,15 +63,15 @@ def prepare(name: str) -> None:
         raise ToolError("BLENDER must be the path of a Blender program, for instance BLENDER=/usr/bin/blender.")
 
 
-def test(name: str, pytest_arguments: Sequence[str] = (), report: Path | None = None) -> int:
+def run_suite(name: str, pytest_arguments: Sequence[str], report: Path | None = None) -> int:
     """Run the suite in a host that is set up; its exit status. `report` is where pytest's XML report goes."""
     if name in bpy_names():
-        return test_in_bpy(name, pytest_arguments, report)
+        return run_in_bpy(name, pytest_arguments, report)
     with stage_for(name) as stage:
-        return test_in_program(stage, pytest_arguments, report)
+        return run_in_program(stage, pytest_arguments, report)
 
 
-def test_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None) -> int:
+def run_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None) -> int:
     python = environments.ENVIRONMENTS[name].python
     with tempfile.TemporaryDirectory() as settings:
         variables = {**os.environ, "PYTHONPATH": str(environments.PACKAGES), "BLENDER_USER_RESOURCES": settings}
@@ -79,7 +79,7 @@ def test_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None)
         return subprocess.run(command, env=variables, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
 
 
-def test_in_program(stage: Stage, pytest_arguments: Sequence[str], report: Path | None) -> int:
+def run_in_program(stage: Stage, pytest_arguments: Sequence[str], report: Path | None) -> int:
     """Install and enable the zip, then run the suite at the next start."""
     fill(stage.folder)
     inside = stage.path_inside
@@ -155,7 +155,7 @@ def main(arguments: list[str]) -> int:
         raise ToolError(f"say which host: {', '.join(names())}")
     name, *pytest_arguments = arguments
     prepare(name)
-    return test(name, pytest_arguments)
+    return run_suite(name, pytest_arguments)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,8 @@ def locks() -> dict[str, str]:
 
 def compile_lock(lock: str, python: str) -> None:
     source = REQUIREMENTS / lock.replace(".txt", ".in")
-    options = ["--quiet", "--generate-hashes", "--no-emit-index-url", "--no-header", "--no-annotate", "--python-version", python]
+    options = ["--quiet", "--generate-hashes", "--no-emit-index-url", "--no-header", "--no-annotate"]
+    options += ["--python-version", python]
     if lock == "extension.txt":
         options.append("--no-deps")  # numpy comes with Blender
     run([ensure_uv(), "pip", "compile", *options, source, "-o", REQUIREMENTS / lock], env=uv_variables())

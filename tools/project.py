@@ -31,7 +31,8 @@ def run(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None, 
 def output_of(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None) -> str:
     """The standard output of a command; ToolError with its standard error where it fails."""
     words = [str(word) for word in command]
-    done = subprocess.run(words, env=dict(env) if env else None, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    variables = dict(env) if env else None
+    done = subprocess.run(words, env=variables, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     if done.returncode:
         raise ToolError(f"This command failed: {' '.join(words)}\n{done.stderr.strip() or done.stdout.strip()}")
     return done.stdout
