@@ -22,7 +22,7 @@ def build() -> Path:
     target = ROOT / "dist" / f"meniscus-{extension_wheels.manifest()['version']}.zip"
     target.parent.mkdir(exist_ok=True)
     packager, tags = blender_packager()
-    valid_tags = ["--valid-tags", tags]
+    valid_tags: list[str | Path] = ["--valid-tags", tags]
     output_of([sys.executable, packager, "build", "--source-dir", ROOT, "--output-filepath", target, *valid_tags])
     run([sys.executable, packager, "validate", target, *valid_tags])
     return target

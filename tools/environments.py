@@ -73,7 +73,7 @@ def make(environment: Environment, python: str, lock: Path) -> None:
     ensure_libraries()
     uv = ensure_uv()
     run([uv, "venv", "--quiet", "--clear", "--python", python, environment.folder], env=uv_variables())
-    install = [uv, "pip", "install", "--quiet", "--require-hashes", "--no-deps", "--only-binary", ":all:"]
+    install: list[str | Path] = [uv, "pip", "install", "--quiet", "--require-hashes", "--no-deps", "--only-binary", ":all:"]
     run([*install, "-r", lock, "--python", environment.python], env=uv_variables())
     if environment.package:
         link_package(environment, environment.package)
@@ -126,7 +126,14 @@ def ensure_uv() -> Path:
     with locked("uv"):
         if not stamp.is_file() or stamp.read_text() != fingerprint(lock):
             make_plain_venv(UV_FOLDER)
-            pip = [UV_FOLDER / "bin" / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+            pip: list[str | Path] = [
+                UV_FOLDER / "bin" / "python",
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+            ]
             run([*pip, "--require-hashes", "--only-binary", ":all:", "-r", lock])
             stamp.write_text(fingerprint(lock))
     return UV_FOLDER / "bin" / "uv"

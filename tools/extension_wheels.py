@@ -48,7 +48,15 @@ def download() -> list[Path]:
 def download_for(tags: tuple[str, ...], python: str) -> Path:
     """Download the wheels of one platform and Python; pip checks their hashes."""
     folder = DOWNLOADS / f"{tags[0]}-{python}"
-    command = [UV_FOLDER / "bin" / "python", "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command: list[str | Path] = [
+        UV_FOLDER / "bin" / "python",
+        "-m",
+        "pip",
+        "download",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+    ]
     command += ["--require-hashes", "--only-binary", ":all:", "--python-version", python]
     command += [word for tag in tags for word in ("--platform", tag)]
     output_of([*command, "-r", LOCK, "-d", folder])

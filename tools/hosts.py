@@ -141,7 +141,16 @@ def ensure_pytest_site() -> Path:
         if not site.is_dir():
             partial = site.with_suffix(".partial")
             shutil.rmtree(partial, ignore_errors=True)
-            install = [environments.ensure_uv(), "pip", "install", "--quiet", "--no-deps", "--require-hashes", "-r", lock]
+            install: list[str | Path] = [
+                environments.ensure_uv(),
+                "pip",
+                "install",
+                "--quiet",
+                "--no-deps",
+                "--require-hashes",
+                "-r",
+                lock,
+            ]
             run([*install, "--python", sys.executable, "--target", partial], env=environments.uv_variables())
             partial.rename(site)
     return site

@@ -203,7 +203,7 @@ def main(arguments: list[str]) -> None:
     found = violations(package_files())
     if found:
         raise ToolError("the import rules are broken.\n" + "\n".join(found))
-    print("The import rules hold.")
+    print("The import rules hold.", flush=True)
 
 
 if __name__ == "__main__":

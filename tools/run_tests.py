@@ -22,9 +22,9 @@ import build_extension
 import extension_wheels
 import hosts
 import lint
-from project import CACHE, ROOT, ToolError, command_line
+from project import ROOT, ToolError, command_line
 
-REPORTS = CACHE / "reports"
+REPORTS = ROOT / "out" / "reports"
 NO_TESTS_COLLECTED = 5
 
 
@@ -129,9 +129,8 @@ def summarise(results: list[Result]) -> int:
     """Print the table, the hosts that are missing in a box, and one closing line; the exit status."""
     announce("summary")
     for result in results:
-        print(
-            f"{result.name:<12} {result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped  {result.problem}"
-        )
+        counts = f"{result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped"
+        print(f"{result.name:<12} {counts}  {result.problem}")
     missing = [result for result in results if result.is_missing]
     if missing:
         print_box([f"NOT TESTED in {result.name}: {result.problem}" for result in missing])
