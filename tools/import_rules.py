@@ -37,8 +37,11 @@ AREAS = (
     Area("addon/render", ("addon/fluid", "addon/render", "gpu_shaders"), frozenset({"numpy", "meniscus_native"})),
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
     Area("gpu_shaders", ("addon/fluid", "addon/render/method", "gpu_shaders"), OPENGL | {"numpy"}),
-    Area("samples", ("addon", "gpu_shaders", "samples"), None),
+    Area("samples", ("addon", "gpu_shaders", "samples", ""), None),
 )
+
+# What the package itself offers besides its interface, which is for users and the samples.
+VERSION = "__version__"
 
 # The light modules that the package may import at once, whether it is used or only enabled.
 LIGHT = frozenset({"__future__", "importlib", "typing"})
@@ -52,7 +55,10 @@ PARAMETERS = "gpu_shaders/methods/*/params.py"
 
 @dataclass(frozen=True)
 class Import:
-    """An import statement's target: a foreign package's name, or a path in the project ('' is the package itself)."""
+    """An import statement's target: a foreign package's name, or a path in the project.
+
+    What is imported from the package itself has the path '', its version the path '__version__'.
+    """
 
     line: int
     target: str
@@ -102,9 +108,7 @@ def why_too_heavy(item: Import) -> str:
 
 
 def why_project_forbidden(area: Area, target: str) -> str:
-    if any(target == folder or target.startswith(f"{folder}/") for folder in area.project):
-        return ""
-    if area.folder == "addon/blender" and target == "":
+    if target == VERSION or any(target == folder or target.startswith(f"{folder}/") for folder in area.project):
         return ""
     return f"{area.folder} may import only {', '.join(area.project)} from the package"
 
@@ -187,7 +191,8 @@ def targets_of(path: str, node: ast.ImportFrom, files: Mapping[str, object]) -> 
     base = "/".join([*folders, *(node.module or "").split(".")]).strip("/")
     for alias in node.names:
         module = f"{base}/{alias.name}".strip("/")
-        yield (module if f"{module}.py" in files or f"{module}/__init__.py" in files else base), True
+        is_module = f"{module}.py" in files or f"{module}/__init__.py" in files or module == VERSION
+        yield module if is_module else base, True
 
 
 def package_files(root: Path = ROOT) -> dict[str, str]:

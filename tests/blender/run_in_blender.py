@@ -2,11 +2,13 @@
 
 blender --background --python run_in_blender.py -- SITE [PYTEST_ARGUMENT ...]
 
-SITE is a folder that holds pytest. The exit status is pytest's.
+SITE is a folder that holds pytest. The exit status is pytest's, or 1 where the extension cannot be disabled afterwards.
 """
 
 import sys
+import traceback
 
+import addon_utils
 import bpy
 
 EXTENSION = "bl_ext.user_default.meniscus"
@@ -18,5 +20,12 @@ sys.path.insert(0, site)
 
 import pytest  # noqa: E402 - found in the folder that was just added
 
+status = int(pytest.main(pytest_arguments))
 sys.stdout.flush()
-sys.exit(int(pytest.main(pytest_arguments)))
+
+# Blender disables its extensions when it quits, and would only print what goes wrong there.
+errors: list[Exception] = []
+addon_utils.disable(EXTENSION, handle_error=errors.append)
+for error in errors:
+    traceback.print_exception(error)
+sys.exit(status or len(errors))

@@ -29,6 +29,7 @@ def test_the_checker_reads_every_area_of_the_package():
         ("addon/render/planted.py", "from ..blender.properties import Scene"),
         ("addon/render/planted.py", "from ..output import exr"),
         ("addon/render/planted.py", "from .. import output"),
+        ("addon/blender/planted.py", "from ... import render"),
         ("addon/blender/planted.py", "import moderngl"),
         ("addon/blender/planted.py", "import OpenEXR"),
         ("addon/blender/planted.py", "import meniscus_native"),
@@ -69,12 +70,12 @@ def test_opengl_behind_a_methods_parameters_is_found():
     ("path", "source"),
     [
         ("addon/fluid/allowed.py", "import math\nimport numpy.typing as npt\nfrom . import kernels\nfrom .balls import Balls"),
-        ("addon/output/allowed.py", "import OpenEXR\nfrom ..fluid.image import ImageBuffers"),
+        ("addon/output/allowed.py", "import OpenEXR\nfrom ... import __version__\nfrom ..fluid.image import ImageBuffers"),
         ("addon/render/allowed.py", "import meniscus_native\nfrom ...gpu_shaders import methods\nfrom ..fluid import errors"),
         ("addon/blender/allowed.py", "import bpy, gpu, bl_ui\nfrom ... import __version__\nfrom ..output.exr import write_exr"),
         ("gpu_shaders/allowed.py", "import moderngl\nfrom ..addon.render.method import Method"),
         ("gpu_shaders/methods/allowed/params.py", "def late():\n    import moderngl"),
-        ("samples/allowed.py", "import bpy\nfrom PIL import Image\nfrom ..addon.fluid.balls import Balls"),
+        ("samples/allowed.py", "import bpy\nfrom PIL import Image\nfrom .. import Balls, render"),
         ("__init__.py", "import importlib\n\n\ndef late():\n    from .addon import blender"),
     ],
 )
