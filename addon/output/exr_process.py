@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, cast
@@ -65,12 +66,13 @@ class ExrProcess:
         compression: str = "ZIP",
         frame: int | None = None,
         frames_per_second: float | None = None,
-    ) -> Future[None]:
+    ) -> Future[float]:
         """Begin to write `image`, see :func:`exr.write_exr`.
 
         Returns
         -------
-        A future that is done when the file is whole, or holds the :class:`OutputError` that says why it is not.
+        A future that is done when the file is whole: the milliseconds that this took, or the :class:`OutputError` that says
+        why it failed.
 
         Raises
         ------
@@ -92,8 +94,9 @@ class ExrProcess:
             self._child.end()
             self._child = None
 
-    def _write(self, path: Path, content: ExrContent) -> None:
+    def _write(self, path: Path, content: ExrContent) -> float:
         """Runs in the worker thread, which alone talks to the child."""
+        start = time.perf_counter()
         child = self._child = self._child or _Child()
         error = child.write(path, content)
         if error is None:
@@ -101,6 +104,7 @@ class ExrProcess:
             raise child.lost(path)
         if error:
             raise OutputError(error)
+        return (time.perf_counter() - start) * 1e3
 
 
 class _Child:
@@ -132,7 +136,9 @@ class _Child:
         """Clear up after the process ended while it had `path` to write, and say so."""
         status = self.end()
         temporary_path(path, self._process.pid).unlink(missing_ok=True)
-        return OutputError(f"Cannot write {path}: the process that writes EXR files ended early (status {status}); render it again")
+        return OutputError(
+            f"Cannot write {path}: the process that writes EXR files ended early (status {status}); render it again"
+        )
 
     def end(self) -> int:
         """Close the pipes and wait for the exit status."""
@@ -152,7 +158,9 @@ def _python() -> str:
     for candidate in candidates:
         if os.access(candidate, os.X_OK) and candidate.is_file():
             return str(candidate)
-    raise OutputError(f"No Python program was found in {prefix} to write EXR files with; use a complete installation of Blender")
+    raise OutputError(
+        f"No Python program was found in {prefix} to write EXR files with; use a complete installation of Blender"
+    )
 
 
 def _package_folders(*names: str) -> list[str]:
