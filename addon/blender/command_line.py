@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import json
-import os
 import signal
 import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TextIO
 
 import bpy
@@ -28,10 +29,13 @@ _commands: list[Any] = []
 def register() -> None:
     """Make ``--command meniscus`` known to Blender."""
     _commands.append(bpy.utils.register_cli_command("meniscus", main))
+    # Blender's Python module up to 4.5 crashes at its exit where a command is still registered.
+    atexit.register(unregister)
 
 
 def unregister() -> None:
     """Take the command away."""
+    atexit.unregister(unregister)
     bpy.utils.unregister_cli_command(_commands.pop())
 
 
@@ -119,7 +123,9 @@ def _output(pattern: str, frame_count: int) -> str:
     """Absolute path with ``####`` where several frames need it."""
     if pattern.startswith("//") and not bpy.data.filepath:
         raise InputError(f"'{pattern}' is relative to the .blend file, but none is open; give an absolute path")
-    absolute = os.path.abspath(bpy.path.abspath(pattern))
+    if pattern.endswith(("/", "\\")) or Path(bpy.path.abspath(pattern)).is_dir():
+        raise InputError(f"'{pattern}' is a folder; add a file name such as fluid_####.exr")
+    absolute = str(Path(bpy.path.abspath(pattern)).absolute())
     if not absolute.lower().endswith(".exr"):
         absolute += ".exr"
     return absolute if frame_count == 1 else numbered_pattern(absolute)

@@ -17,6 +17,7 @@ from ..fluid.errors import CancelledError, MeniscusError, OutputError
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..output.exr_process import ExrProcess
 from ..output.frame_path import frame_path
+from ..output.whole_file import prepare_place
 from ..render.renderer import render
 from .preview import write_png
 from .read_camera import read_camera
@@ -119,8 +120,9 @@ def render_frames(job: RenderJob, is_cancelled: Callable[[], bool] = lambda: Fal
     CancelledError
         The user cancelled; the files that were begun are whole.
     MeniscusError
-        The first frame cannot be rendered.
+        The first frame cannot be rendered, or nothing can be written to the output's folder.
     """
+    prepare_place(frame_path(job.output, job.frames[0]))
     underway: deque[_Underway] = deque()
     with ExrProcess() as writer:
         for frame in job.frames:

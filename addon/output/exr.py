@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from dataclasses import dataclass
 from fractions import Fraction
@@ -79,7 +80,7 @@ def write_exr(
     frame
         Frame number, stored as ``imageCounter`` and as ``Frame``, the name that Blender uses.
     frames_per_second
-        Stored as the nearest fraction with a denominator of at most 1001, which holds 23.976 and the like exactly.
+        Stored as a fraction: 23.976 and the like as 24000/1001, others with a denominator of at most 1001.
 
     Notes
     -----
@@ -119,12 +120,21 @@ def exr_content(
         attributes["imageCounter"] = frame
         attributes["Frame"] = str(frame)
     if frames_per_second is not None:
-        rate = Fraction(frames_per_second).limit_denominator(1001)
+        rate = _frame_rate(frames_per_second)
         attributes["framesPerSecond"] = [rate.numerator, rate.denominator]
     channels: dict[str, npt.NDArray[Any]] = {}
     for name, values in image.passes.items():
         channels.update(_channels(f"{view_layer}.{PASSES[name].blender_name}", PASSES[name], values))
     return ExrContent(attributes, channels)
+
+
+def _frame_rate(rate: float) -> Fraction:
+    """Whole rates and those by 1.001 exactly, although 23.976 or Blender's 24 / 1.001 are only near 24000 / 1001."""
+    for denominator in (1, 1001):
+        exact = Fraction(round(rate * denominator), denominator)
+        if math.isclose(exact, rate, rel_tol=2e-6):
+            return exact
+    return Fraction(rate).limit_denominator(1001)
 
 
 def write_content(path: str | os.PathLike[str], content: ExrContent) -> None:

@@ -43,18 +43,21 @@ serve()
 class ExrProcess:
     """A child process that writes EXR files, one after the other.
 
-    It starts with the first file, and again where it was killed. Use it in a ``with`` block: leaving it waits for all files.
+    It starts again where it was killed. Use it in a ``with`` block: leaving it waits for all files.
     """
 
     def __init__(self) -> None:
+        """Costs nothing yet: the process starts with the first file."""
         self._child: _Child | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="meniscus_exr")
         self._free_places = threading.Semaphore(MAX_IN_FLIGHT)
 
     def __enter__(self) -> ExrProcess:
+        """For ``with`` blocks."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Wait for all files."""
         self.close()
 
     def write(

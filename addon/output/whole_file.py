@@ -30,37 +30,40 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         The folder cannot be made, the file cannot be written or the disk is full.
     """
     target = Path(path).absolute()
-    _check_place(target)
+    prepare_place(target)
     temporary = temporary_path(target, os.getpid())
     try:
         yield temporary
         _flush_to_disk(temporary)
-        os.replace(temporary, target)
+        temporary.replace(target)
     except OSError as error:
-        raise write_error(target, error) from error
+        raise _write_error(target, error) from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def write_error(path: Path, error: OSError) -> OutputError:
+def prepare_place(path: Path) -> None:
+    """Make the folder of `path`; raises OutputError where that or writing there is impossible."""
+    if path.is_dir():
+        raise OutputError(f"Cannot write {path}: it is a folder; add a file name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot make the folder {path.parent}: {_reason(error)}; choose another folder") from error
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"Cannot write into the folder {path.parent}; check its permissions or choose another folder")
+
+
+def _write_error(path: Path, error: OSError) -> OutputError:
     """What the user is told when writing `path` fails."""
     if error.errno in _FULL_DISK:
         return OutputError(f"Cannot write {path}: the disk is full; free some space or choose another folder")
     return OutputError(f"Cannot write {path}: {_reason(error)}; check the permissions or choose another folder")
 
 
-def _check_place(target: Path) -> None:
-    if target.is_dir():
-        raise OutputError(f"Cannot write {target}: it is a folder; add a file name")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"Cannot make the folder {target.parent}: {_reason(error)}; choose another folder") from error
-
-
 def _flush_to_disk(path: Path) -> None:
     """A full disk or a lost network drive may show only here."""
-    with open(path, "rb+") as file:
+    with path.open("rb+") as file:
         os.fsync(file.fileno())
 
 
