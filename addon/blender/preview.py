@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,6 +14,9 @@ from ..output.whole_file import whole_file
 
 BACKGROUND = 0.05
 """Linear grey behind the fluid: dark enough for foam, light enough for deep water."""
+
+_LAST_CHUNK = b"IEND\xaeB`\x82"
+"""How every whole PNG file ends."""
 
 
 def write_png(path: str | os.PathLike[str], rgba: npt.NDArray[np.float32]) -> None:
@@ -41,13 +45,14 @@ def write_png(path: str | os.PathLike[str], rgba: npt.NDArray[np.float32]) -> No
         bpy.data.images.remove(picture)
 
 
-def _save(picture: bpy.types.Image, temporary: os.PathLike[str], path: str | os.PathLike[str]) -> None:
+def _save(picture: bpy.types.Image, temporary: Path, path: str | os.PathLike[str]) -> None:
     try:
-        picture.save(filepath=os.fspath(temporary))
+        picture.save(filepath=str(temporary))
     except RuntimeError as error:
-        raise OutputError(
-            f"Cannot write {os.fspath(path)}: Blender could not save the picture, perhaps the disk is full"
-        ) from error
+        raise OutputError(f"Cannot write {os.fspath(path)}: {str(error).strip()}") from error
+    # Blender does not tell when the disk fills up.
+    if not temporary.read_bytes().endswith(_LAST_CHUNK):
+        raise OutputError(f"Cannot write {os.fspath(path)}: the disk is full; free some space or choose another folder")
 
 
 def _display_rgba(rgba: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
