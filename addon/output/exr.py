@@ -166,7 +166,7 @@ def _channels(prefix: str, image_pass: Pass, values: npt.NDArray[np.float32]) ->
     return {f"{prefix}.{channel}": np.ascontiguousarray(planes[..., i]) for i, channel in enumerate(image_pass.channels)}
 
 
-def _encoded(content: ExrContent) -> memoryview:
+def _encoded(content: ExrContent) -> bytes:
     try:
         import OpenEXR
     except ImportError as error:
@@ -178,7 +178,7 @@ def _encoded(content: ExrContent) -> memoryview:
             file.write(stream)
     except (RuntimeError, ValueError, TypeError) as error:
         raise OutputError(f"The image cannot be encoded as EXR: {error}") from error
-    return stream.getbuffer()
+    return stream.getvalue()
 
 
 def _header(attributes: dict[str, Any]) -> dict[str, Any]:
