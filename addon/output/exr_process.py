@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -49,7 +50,7 @@ class ExrProcess:
     def __init__(self) -> None:
         """Costs nothing yet: the process starts with the first file."""
         self._child: _Child | None = None
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="meniscus_exr")
+        self._worker = ThreadPoolExecutor(1, "meniscus_exr", initializer=_block_broken_pipe_signal)
         self._free_places = threading.Semaphore(MAX_IN_FLIGHT)
 
     def __enter__(self) -> ExrProcess:
@@ -149,6 +150,12 @@ class _Child:
             self._requests.close()
         self._answers.close()
         return self._process.wait()
+
+
+def _block_broken_pipe_signal() -> None:
+    """Some builds of Blender do not ignore this signal: they would end with the child. The write then fails with an error."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
 
 
 def _python() -> str:

@@ -99,6 +99,20 @@ def test_a_child_killed_while_it_waits_is_replaced(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["first.exr", "later.exr"]
 
 
+def test_a_killed_child_does_not_take_a_process_with_it_that_heeds_broken_pipes(tmp_path: Path) -> None:
+    """Python ignores the signal, some builds of Blender do not."""
+    handler = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    try:
+        with ExrProcess() as writer:
+            writer.write(tmp_path / "first.exr", random_image()).result()
+            os.kill(child_id(writer), signal.SIGKILL)
+            writer._child._process.wait()
+            with pytest.raises(OutputError, match="ended early"):
+                writer.write(tmp_path / "lost.exr", random_image()).result()
+    finally:
+        signal.signal(signal.SIGPIPE, handler)
+
+
 def test_a_child_killed_in_the_middle_of_a_file_leaves_the_old_one(tmp_path: Path) -> None:
     image = random_image(640, 480)
     target = tmp_path / "image.exr"
