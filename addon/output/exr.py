@@ -171,6 +171,8 @@ def _encoded(content: ExrContent) -> bytes:
         import OpenEXR
     except ImportError as error:
         raise OutputError(f"The OpenEXR package cannot be loaded ({error}); install the extension again") from error
+    if OpenEXR.global_thread_count() == 0:  # Nobody chose a number; compressing takes longest.
+        OpenEXR.set_global_thread_count(os.cpu_count() or 1)
     stream = io.BytesIO()
     try:
         # The file object changes the dictionary it is given, hence the copy.
