@@ -189,9 +189,8 @@ def _header(attributes: dict[str, Any]) -> dict[str, Any]:
 
     header = dict(attributes)
     header["type"] = OpenEXR.scanlineimage
-    header["compression"] = getattr(
-        OpenEXR, f"{'NO' if header['compression'] == 'NONE' else header['compression']}_COMPRESSION"
-    )
+    compression = header["compression"]
+    header["compression"] = getattr(OpenEXR, f"{'NO' if compression == 'NONE' else compression}_COMPRESSION")
     for name in ("displayWindow", "dataWindow"):
         header[name] = tuple(np.array(corner, np.int32) for corner in header[name])
     for name in ("worldToCamera", "worldToNDC"):
