@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +19,10 @@ from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from ..fluid.view_balls import ViewBalls, view_balls
 from .method import Method, MethodInfo, Surface
-from .registry import create_method, gpu, method_infos
+from .registry import create_method, method_infos
 from .shading import headlight
+
+Element = TypeVar("Element", np.float32, np.bool_)
 
 BACKENDS = ("auto", "gpu", "cpu")
 
@@ -145,7 +148,7 @@ def _world_directions(camera: Camera) -> npt.NDArray[np.float64]:
     return directions @ camera.world_from_view[:3, :3].T
 
 
-def _in_whole_image(image: npt.NDArray, camera: Camera, background: float) -> npt.NDArray:
+def _in_whole_image(image: npt.NDArray[Element], camera: Camera, background: float) -> npt.NDArray[Element]:
     if camera.region is None:
         return image
     region = camera.region

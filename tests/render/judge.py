@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import meniscus
 import numpy as np
+
+import meniscus
 from meniscus.addon.fluid.kernels import KERNELS
 
 # A ray whose density has an extremum this close to the isovalue cannot be decided in single precision.
@@ -86,7 +87,7 @@ def judge(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> None:
     suspects = np.flatnonzero((hit != should_hit) | (error > 1e-3))
     undecidable = [index for index in suspects if is_undecidable(balls, field, want, index, camera, t[index])]
     wrong = [
-        f"pixel {divmod(int(index), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, R = {want.radius[index]:.3g}"
+        f"{divmod(int(index), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, R = {want.radius[index]:.2g}"
         for index in suspects
         if index not in undecidable
     ]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import meniscus
 import numpy as np
 import pytest
 from judge import judge
-from meniscus.addon.render.registry import method_infos
 from scenes import SCENES
+
+import meniscus
+from meniscus.addon.render.registry import method_infos
 
 METHODS = [info.name for info in method_infos()]
 
@@ -58,7 +59,8 @@ def test_no_balls_give_an_empty_image(method):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=8, height=6)
     image = meniscus.render(meniscus.Balls(np.zeros((0, 3)), 1.0), camera, meniscus.Field(), method=method)
     assert not image.hit.any()
-    assert np.all(image["depth"] == np.float32(1e10)) and np.all(image["normal"] == 0)
+    assert np.all(image["depth"] == np.float32(1e10))
+    assert np.all(image["normal"] == 0)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
+
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.render.exact_intervals import bernstein

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import meniscus
 import numpy as np
 import pytest
+
+import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.render.exact_intervals import bernstein
@@ -36,7 +37,8 @@ def test_ray_past_the_kernel_sphere_misses():
     radius = np.sqrt(0.5)
     assert np.isfinite(cast_one(balls, field, (radius - 1e-9, -3, 0))[0])
     t, normal = cast_one(balls, field, (radius + 1e-9, -3, 0))
-    assert np.isinf(t) and not normal.any()
+    assert np.isinf(t)
+    assert not normal.any()
 
 
 def test_two_equal_balls_along_the_ray():

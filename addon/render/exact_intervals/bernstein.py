@@ -32,7 +32,7 @@ def compose(kernel: Kernel, x: FloatArray) -> FloatArray:
     Adding a constant to a polynomial in Bernstein form adds it to every coefficient.
     """
     leading, *rest = reversed(kernel.coefficients)
-    result = np.full((len(x), 1), leading)
+    result: FloatArray = np.full((len(x), 1), leading)
     for coefficient in rest:
         result = product(result, x) + coefficient
     return result
@@ -68,7 +68,8 @@ def first_root(p: FloatArray) -> FloatArray:
     """
     root = np.full(len(p), np.nan)
     index = np.flatnonzero(p.max(axis=1) >= 0)
-    low, width = np.zeros(len(index)), np.ones(len(index))
+    low: FloatArray = np.zeros(len(index))
+    width: FloatArray = np.ones(len(index))
     while len(index):
         segment = restrict(p[index], low, np.minimum(low + width, 1))
         reached = segment[:, 0] >= 0
@@ -88,8 +89,9 @@ def first_root(p: FloatArray) -> FloatArray:
 
 def _bracketed_root(p: FloatArray) -> FloatArray:
     """The one root of each polynomial with ``p(0) < 0 <= p(1)``: Newton's method, bisection where it leaves the bracket."""
-    low, high = np.zeros(len(p)), np.ones(len(p))
-    u = np.full(len(p), 0.5)
+    low: FloatArray = np.zeros(len(p))
+    high: FloatArray = np.ones(len(p))
+    u: FloatArray = np.full(len(p), 0.5)
     slope_of = np.diff(p, axis=1) * (p.shape[1] - 1)
     for _ in range(200):
         height = value(p, u)

@@ -192,7 +192,8 @@ def normals(rays: Rays, spheres: Spheres, pairs: Pairs, t: FloatArray, field: Fi
     pull = spheres.weights[pairs.ball] * field.density_kernel.derivative(x) / radius**2
     outward = np.stack([_sums(pairs.ray, pull * axis, len(rays)) for axis in from_center.T], axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
-    return np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    unit: FloatArray = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    return unit
 
 
 def blended_colors(
