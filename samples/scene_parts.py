@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import bmesh
 import bpy
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +54,32 @@ def add_box(scene: bpy.types.Scene, name: str, low: Point, high: Point, without:
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], [corners for side, corners in _BOX_FACES.items() if side not in without])
     return add_mesh(scene, name, mesh)
+
+
+def add_turned(
+    scene: bpy.types.Scene, name: str, profile: Sequence[tuple[float, float]], segments: int = 32
+) -> bpy.types.Object:
+    """A body of revolution around the z axis, from a profile of (radius, height), Blender units."""
+    angles = np.arange(segments) * (2 * np.pi / segments)
+    rings = np.array(
+        [(radius * np.cos(angles), radius * np.sin(angles), np.full(segments, height)) for radius, height in profile]
+    )
+    here = np.arange(len(profile) - 1)[:, None] * segments + np.arange(segments)
+    beside = np.arange(len(profile) - 1)[:, None] * segments + (np.arange(segments) + 1) % segments
+    faces = np.stack([here, here + segments, beside + segments, beside], axis=-1).reshape(-1, 4)
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(rings.transpose(0, 2, 1).reshape(-1, 3).tolist(), [], faces.tolist())
+    _merge_coincident_points(mesh)
+    return add_mesh(scene, name, mesh)
+
+
+def _merge_coincident_points(mesh: bpy.types.Mesh) -> None:
+    """Join the points on the axis, where faces without area would confuse the collision."""
+    editable = bmesh.new()
+    editable.from_mesh(mesh)
+    bmesh.ops.remove_doubles(editable, verts=editable.verts, dist=1e-6)
+    editable.to_mesh(mesh)
+    editable.free()
 
 
 def add_points(

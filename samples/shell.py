@@ -44,8 +44,12 @@ def save_sample(build: Callable[..., Any], arguments: list[str] | None = None) -
 
 def _parser(build: Callable[..., Any]) -> argparse.ArgumentParser:
     description = inspect.getdoc(inspect.getmodule(build)) or ""
-    parser = argparse.ArgumentParser(description=description.split("\n\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=description.split("\n\n")[0], formatter_class=argparse.ArgumentDefaultsHelpFormatter
+    )
     parser.add_argument("--output", required=True, help="the .blend file to write")
     for parameter in list(inspect.signature(build).parameters.values())[1:]:
-        parser.add_argument(f"--{parameter.name.replace('_', '-')}", type=type(parameter.default), default=parameter.default, help=" ")
+        parser.add_argument(
+            f"--{parameter.name.replace('_', '-')}", type=type(parameter.default), default=parameter.default, help=" "
+        )
     return parser
