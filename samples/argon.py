@@ -6,6 +6,7 @@ barely blend. The molecular dynamics is our own (lennard_jones.py) and takes abo
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..addon.fluid.balls import Balls
+from ..addon.fluid.errors import InputError
 from . import lennard_jones
 from .lennard_jones import Simulation, hot_gas
-from .store import stored_file
+from .store import source_texts, stored_file
 
 if TYPE_CHECKING:
     import bpy
@@ -37,7 +39,7 @@ FRAMES_PER_SECOND = 25
 def balls(count: int = 5000, seed: int = 1, frame: int = FRAMES) -> Balls:
     """The atoms at a frame from 1 to 60, centred in the origin; from the store where they were computed before."""
     if not 1 <= frame <= FRAMES:
-        raise ValueError(f"The frame must be from 1 to {FRAMES}, not {frame}")
+        raise InputError(f"The frame must be from 1 to {FRAMES}, not {frame}")
     with np.load(_trajectory_file(count, seed)) as trajectory:
         positions = (trajectory["positions"][frame - 1] - trajectory["box"] / 2) * SIGMA
         a_second = SIGMA * lennard_jones.TIME_STEP * STEPS_A_FRAME * FRAMES_PER_SECOND
@@ -60,7 +62,7 @@ def build(scene: bpy.types.Scene, *, count: int = 5000, seed: int = 1, frame: in
 
 def _trajectory_file(count: int, seed: int) -> Path:
     """An .npz file with positions and velocities (FRAMES, count, 3) float32 in the model's units, and the box's side."""
-    scripts = [Path(source).read_text(encoding="utf-8") for source in (__file__, lennard_jones.__file__)]
+    scripts = source_texts(sys.modules[__name__], lennard_jones)
     parameters = {"count": count, "seed": seed, "scripts": scripts}
 
     def make(path: Path) -> None:

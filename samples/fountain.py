@@ -14,8 +14,10 @@ from .particle_system import add_collision, add_particle_system, bake, make_liqu
 
 SPEED = 5.0
 """Of the jet at the nozzle, Blender units a second."""
+SPREAD = 0.3
+"""Random part of the velocity, which tears droplets off, Blender units a second."""
 NOZZLE_RADIUS, NOZZLE_HEIGHT = 0.1, 0.5
-BASIN_RADIUS, BASIN_HEIGHT, BASIN_WALL = 1.3, 0.35, 0.15
+BASIN_RADIUS, BASIN_HEIGHT, BASIN_WALL = 1.2, 0.35, 0.15
 """Blender units; the wall is far thicker than a particle moves in a step."""
 LIFETIME = 55
 """Of a particle, frames."""
@@ -48,7 +50,7 @@ def build(scene: bpy.types.Scene, *, seed: int = 1, spacing: float = 0.05, frame
     scene_parts.set_frames(scene, frame_end)
     scene.gravity = (0.0, 0.0, -9.81)
     _add_basin(scene)
-    scene_parts.add_camera(scene, (0.0, -5.2, 2.6), (0.0, 0.0, 0.7), lens=45.0)
+    scene_parts.add_camera(scene, (0.0, -6.0, 2.8), (0.0, 0.0, 0.9), lens=45.0)
     scene_parts.add_lights(scene)
     liquid = _add_jet(scene, spacing, seed, frame_end)
     bake(scene, liquid)
@@ -80,6 +82,7 @@ def _add_jet(scene: bpy.types.Scene, spacing: float, seed: int, frame_end: int) 
     settings.frame_end = frame_end
     settings.emit_from = "FACE"
     settings.object_align_factor = (0.0, 0.0, SPEED)
+    settings.factor_random = SPREAD
     make_liquid(settings, spacing=spacing, sound_speed=SOUND_SPEED, viscosity=VISCOSITY)
     scene_parts.use_as_fluid(nozzle, source="PARTICLES", radius_mode="PARTICLE", radius_factor=2 * RADIUS)
     return nozzle

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..addon.fluid.errors import InputError
+
 FloatArray = npt.NDArray[np.float64]
 IndexArray = npt.NDArray[np.int64]
 
@@ -72,10 +74,17 @@ def neighbour_pairs(positions: FloatArray, box: float, reach: float) -> tuple[In
     Returns
     -------
     first, second : (P,) indices.
+
+    Raises
+    ------
+    InputError
+        The box is too narrow.
     """
     cells = int(box // reach)
     if cells < 3:
-        raise ValueError(f"The box ({box:.3g}) must be at least three times as wide as atoms reach ({reach:.3g})")
+        raise InputError(
+            f"The box ({box:.3g}) must be at least three times as wide as atoms reach ({reach:.3g}); take more atoms"
+        )
     cell_of = np.minimum((positions * (cells / box)).astype(np.int64), cells - 1)
     flat = _flat_cells(cell_of, cells)
     order = np.argsort(flat, kind="stable")

@@ -6,6 +6,8 @@ import math
 
 import bpy
 
+from ..addon.fluid.errors import MeniscusError
+
 SMOOTHING = 1.2
 """Smoothing length of the SPH kernel, particle spacings; the kernel reaches twice as far."""
 COURANT = 0.5
@@ -82,11 +84,11 @@ def bake(scene: bpy.types.Scene, item: bpy.types.Object) -> None:
 
     Raises
     ------
-    RuntimeError
+    MeniscusError
         Blender did not bake.
     """
     cache = item.particle_systems[-1].point_cache
     with bpy.context.temp_override(scene=scene, active_object=item, point_cache=cache):
         bpy.ops.ptcache.bake(bake=True)
     if not cache.is_baked:
-        raise RuntimeError(f"Blender did not bake the particles of '{item.name}'")
+        raise MeniscusError(f"Blender did not bake the particles of '{item.name}'; see its messages above")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import bmesh
@@ -13,6 +14,7 @@ from mathutils import Vector
 
 from .. import register
 from ..addon.fluid.balls import Balls
+from ..addon.fluid.errors import OutputError
 
 Point = tuple[float, float, float]
 
@@ -34,10 +36,18 @@ _ATTRIBUTE_TYPES = {
 
 def new_scene() -> bpy.types.Scene:
     """An empty file's scene, with this package registered so that objects can be marked as fluids."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     if not hasattr(bpy.types.Object, "meniscus"):
         register()
     return bpy.context.scene
+
+
+def save_blend(path: Path) -> None:
+    """Save the open file, with the simulations that were baked in it; OutputError says why it cannot be saved."""
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, check_existing=False)
+    except RuntimeError as error:
+        raise OutputError(f"Cannot save {path}: {str(error).strip()}") from error
 
 
 def add_mesh(scene: bpy.types.Scene, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:

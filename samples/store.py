@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+from ..addon.output.whole_file import whole_file
 
 FOLDER = Path(__file__).resolve().parents[1] / ".cache" / "samples"
 
@@ -23,15 +24,20 @@ def stored_file(name: str, suffix: str, parameters: Mapping[str, Any], make: Cal
         All that the content depends on, plain data; becomes part of the file's name.
     make
         Writes the file to the path that it is given; the file takes its place only when it is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
     """
     key = hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()[:16]
     path = FOLDER / f"{name}_{key}{suffix}"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_name(f"{name}_{key}_{os.getpid()}{suffix}")
-        try:
+        with whole_file(path) as unfinished:
             make(unfinished)
-            os.replace(unfinished, path)
-        finally:
-            unfinished.unlink(missing_ok=True)
     return path
+
+
+def source_texts(*modules: Any) -> list[str]:
+    """The text of modules, as parameters: what they compute is computed anew when they change."""
+    return [Path(module.__file__).read_text(encoding="utf-8") for module in modules]
