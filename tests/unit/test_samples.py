@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from meniscus.addon.fluid.errors import InputError, OutputError
 from meniscus.samples import argon, block, lennard_jones, scattered, shell, store
 
