@@ -10,21 +10,21 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 import numpy.typing as npt
 
 from . import particle_system, scene_parts
+from .one_thread import bpy
 from .particle_system import add_collision, add_particle_system, bake, make_liquid
 from .store import source_texts, stored_file
 
-TANK = (4.0, 1.1, 2.4)
+TANK = (4.0, 1.2, 2.4)
 """Length, depth and height, Blender units."""
 WALL = 0.2
 """Thickness of the colliding walls: far more than a particle moves in a step."""
-WATER = (1.1, 1.1, 2.2)
+WATER = (1.08, 1.2, 2.16)
 """The block of liquid at the left end of the tank, Blender units."""
-PILLAR_LOW, PILLAR_HIGH = (2.2, 0.4, -0.1), (2.45, 0.7, 0.9)
+PILLAR_LOW, PILLAR_HIGH = (2.2, 0.45, -0.1), (2.45, 0.75, 0.9)
 """Corners of the obstacle, Blender units."""
 
 SOUND_SPEED = 15.0
@@ -35,7 +35,7 @@ RADIUS = 2.0
 """Influence radius, particle spacings."""
 
 
-def build(scene: bpy.types.Scene, *, seed: int = 1, spacing: float = 0.055, frame_end: int = 60) -> bpy.types.Object:
+def build(scene: bpy.types.Scene, *, seed: int = 1, spacing: float = 0.06, frame_end: int = 60) -> bpy.types.Object:
     """Set up and bake the dam break.
 
     Parameters
@@ -45,7 +45,7 @@ def build(scene: bpy.types.Scene, *, seed: int = 1, spacing: float = 0.055, fram
     seed
         Of the small disorder that the liquid starts with.
     spacing
-        Distance of the particles at the start, Blender units; 0.055 makes 16,000 of them.
+        Distance of the particles at the start, Blender units; 0.06 makes 12,960 of them.
     frame_end
         Last frame of the simulation, 25 frames a second.
 
@@ -63,7 +63,7 @@ def build(scene: bpy.types.Scene, *, seed: int = 1, spacing: float = 0.055, fram
     return liquid
 
 
-def baked_file(*, seed: int = 1, spacing: float = 0.055, frame_end: int = 60) -> Path:
+def baked_file(*, seed: int = 1, spacing: float = 0.06, frame_end: int = 60) -> Path:
     """A .blend file with the baked simulation, from the store where it was made before; replaces the open file if not."""
     options: dict[str, Any] = {"seed": seed, "spacing": spacing, "frame_end": frame_end}
 

@@ -13,12 +13,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-import bpy
 from PIL import Image, ImageDraw
 
-from ..addon.blender import command_line
 from ..addon.fluid.errors import MeniscusError
 from . import dam_break, scene_parts
+from .one_thread import bpy
 
 FOLDER = Path(__file__).resolve().parents[1] / "out" / "demo"
 FRAMES = "1,8,14,20,26,33,42,60"
@@ -70,6 +69,9 @@ def _open_simulation() -> float:
 
 
 def _render(folder: Path, frames: str, resolution: str, report_file: Path) -> int:
+    # Imported here because it loads bpy, which one_thread has to do first.
+    from ..addon.blender import command_line
+
     return command_line.main(
         [
             "render",

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-import bpy
 
 from . import scene_parts
+from .one_thread import bpy
 from .particle_system import add_collision, add_particle_system, bake, make_liquid
 
 SPEED = 5.0

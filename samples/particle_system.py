@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import bpy
 
 from ..addon.fluid.errors import MeniscusError
+from .one_thread import bpy
 
 SMOOTHING = 1.2
 """Smoothing length of the SPH kernel, particle spacings; the kernel reaches twice as far."""

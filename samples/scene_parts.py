@@ -6,15 +6,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import bmesh
-import bpy
 import numpy as np
 import numpy.typing as npt
-from mathutils import Vector
 
 from .. import register
 from ..addon.fluid.balls import Balls
 from ..addon.fluid.errors import OutputError
+from .one_thread import bpy
+
+# Loaded after bpy, which they are parts of.
+import bmesh  # isort: skip
+from mathutils import Vector  # isort: skip
 
 Point = tuple[float, float, float]
 

@@ -1,4 +1,7 @@
-"""The samples' arrays, molecular dynamics, store and command line; none of it needs Blender."""
+"""The samples' arrays, molecular dynamics, store and command line, and whether bakes repeat."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -181,3 +184,27 @@ def test_an_unusable_number_on_the_command_line_is_named(capsys, value):
         shell.save_sample(block.build, ["--output", "x.blend", f"--count={value}"])
     assert stop.value.code == 2
     assert f"'{value}' is no whole number greater than 0" in capsys.readouterr().err
+
+
+def test_a_bake_of_many_particles_is_the_same_in_every_process():
+    bake = (
+        "import sys, hashlib, numpy\n"
+        "from meniscus.samples import dam_break, scene_parts\n"
+        "from meniscus.samples.one_thread import bpy\n"
+        "scene = scene_parts.new_scene()\n"
+        "liquid = dam_break.build(scene, spacing=0.12, frame_end=12)\n"
+        "scene.frame_set(12)\n"
+        "particles = liquid.evaluated_get(bpy.context.evaluated_depsgraph_get()).particle_systems[0].particles\n"
+        "positions = numpy.empty(3 * len(particles), numpy.float32)\n"
+        "particles.foreach_get('location', positions)\n"
+        "assert len(particles) > 1000\n"
+        "print('positions', hashlib.sha256(positions.tobytes()).hexdigest())\n"
+    )
+
+    def positions_hash():
+        run = subprocess.run([sys.executable, "-c", bake], capture_output=True, text=True, check=True)
+        return [line for line in run.stdout.splitlines() if line.startswith("positions")]
+
+    first = positions_hash()
+    assert len(first) == 1
+    assert positions_hash() == first
