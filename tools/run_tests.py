@@ -1,0 +1,157 @@
+"""Runs all tests and closes with a summary: lint, unit, render, the extension zip, and tests/blender in every host.
+
+    .venv/bin/python tools/run_tests.py           all of it
+    .venv/bin/python tools/run_tests.py --fast    unit tests and the quick render tests
+
+The hosts are set up in the background while the first suites run. A host that cannot be set up is skipped, loudly; where
+the environment variable CI is set, that is a failure.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import build_extension
+import extension_wheels
+import hosts
+import lint
+from project import ROOT, ToolError, command_line
+
+REPORTS = ROOT / "out" / "reports"
+NO_TESTS_COLLECTED = 5
+
+
+@dataclass
+class Result:
+    """How one suite went; a problem is a sentence, empty when all is well."""
+
+    name: str
+    passed: int = 0
+    failed: int = 0
+    skipped: int = 0
+    problem: str = ""
+    is_missing: bool = False
+
+
+def run_all() -> list[Result]:
+    with ThreadPoolExecutor(1) as background:
+        wheels = background.submit(extension_wheels.download)
+        ready = {name: background.submit(hosts.prepare, name) for name in hosts.names()}
+        results = [check("lint", lint.lint), pytest_suite("unit"), pytest_suite("render")]
+        results.append(check("extension", lambda: build_after(wheels)))
+        results += [host_suite(name, setup) for name, setup in ready.items()]
+    return results
+
+
+def run_fast() -> list[Result]:
+    return [pytest_suite("unit"), pytest_suite("render", "-m", "not slow")]
+
+
+def build_after(wheels: Future[list[Path]]) -> None:
+    wheels.result()
+    build_extension.build()
+
+
+def check(name: str, action: Callable[[], object]) -> Result:
+    """Run a check that has no tests to count."""
+    announce(name)
+    try:
+        action()
+    except ToolError as error:
+        print(error, flush=True)
+        return Result(name, failed=1, problem=str(error).splitlines()[0])
+    return Result(name, passed=1)
+
+
+def pytest_suite(name: str, *options: str) -> Result:
+    """Run tests/NAME in the development environment."""
+    announce(name)
+    command = [sys.executable, "-m", "pytest", "-q", "--junitxml", str(report_of(name)), f"tests/{name}", *options]
+    status = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
+    return result_of(name, status)
+
+
+def host_suite(name: str, setup: Future[None]) -> Result:
+    """Run tests/blender in a host, once it is set up."""
+    announce(f"tests/blender in {name}")
+    try:
+        setup.result()
+    except ToolError as error:
+        print(error, flush=True)
+        return Result(name, problem=str(error).splitlines()[0], is_missing=True)
+    try:
+        status = hosts.run_suite(name, ["-q"], report_of(name))
+    except ToolError as error:
+        print(error, flush=True)
+        return Result(name, failed=1, problem=str(error).splitlines()[0])
+    return result_of(name, status)
+
+
+def report_of(name: str) -> Path:
+    """Where pytest's XML report of a suite goes; a report of an earlier run is removed."""
+    REPORTS.mkdir(parents=True, exist_ok=True)
+    report = REPORTS / f"{name}.xml"
+    report.unlink(missing_ok=True)
+    return report
+
+
+def result_of(name: str, status: int) -> Result:
+    """Read the counts from pytest's report; its exit status has the last word."""
+    result = Result(name)
+    report = REPORTS / f"{name}.xml"
+    if report.is_file():
+        for suite in ElementTree.parse(report).iter("testsuite"):
+            result.skipped += int(suite.get("skipped", 0))
+            result.failed += int(suite.get("failures", 0)) + int(suite.get("errors", 0))
+            result.passed += int(suite.get("tests", 0))
+        result.passed -= result.failed + result.skipped
+    if status == NO_TESTS_COLLECTED:
+        result.problem = "no test was found"
+    elif status and not result.failed:
+        result.problem = f"ended with exit status {status}"
+    if result.problem:
+        result.failed += 1
+    return result
+
+
+def announce(title: str) -> None:
+    print(f"\n=== {title} ===", flush=True)
+
+
+def summarise(results: list[Result]) -> int:
+    """Print the table, the hosts that are missing in a box, and one closing line; the exit status."""
+    announce("summary")
+    for result in results:
+        counts = f"{result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped"
+        print(f"{result.name:<12} {counts}  {result.problem}")
+    missing = [result for result in results if result.is_missing]
+    if missing:
+        print_box([f"NOT TESTED in {result.name}: {result.problem}" for result in missing])
+    is_strict = bool(os.environ.get("CI"))
+    failed = sum(result.failed for result in results) + (len(missing) if is_strict else 0)
+    skipped = sum(result.skipped for result in results)
+    print(f"tests: {sum(result.passed for result in results)} passed, {failed} failed, {skipped} skipped", flush=True)
+    return 1 if failed else 0
+
+
+def print_box(lines: list[str]) -> None:
+    width = max(len(line) for line in lines)
+    border = "#" * (width + 4)
+    print("\n".join(["", border, *(f"# {line:<{width}} #" for line in lines), border, ""]))
+
+
+def main(arguments: list[str]) -> int:
+    if arguments not in ([], ["--fast"]):
+        raise ToolError("run_tests.py takes no arguments but --fast")
+    return summarise(run_fast() if arguments else run_all())
+
+
+if __name__ == "__main__":
+    command_line(main)
