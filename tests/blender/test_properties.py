@@ -1,4 +1,4 @@
-"""The settings of objects and scenes: what they mean, and that they are saved and removed as a whole."""
+"""The settings of objects and scenes: what they mean, and that they are saved."""
 
 import importlib
 
@@ -47,6 +47,14 @@ def test_settings_survive_saving_and_loading(meniscus, empty_scene, tmp_path):
     assert (scene_settings.kernel, scene_settings.backend) == ("poly6", "cpu")
 
 
+def test_every_registered_method_can_be_chosen(meniscus, empty_scene):
+    names = [info.name for info in module(meniscus, "addon.render.registry").method_infos()]
+    assert names
+    for name in ("auto", *names):
+        empty_scene.meniscus.method = name
+        assert empty_scene.meniscus.method == name
+
+
 def test_number_of_a_choice_does_not_depend_on_the_other_choices(meniscus):
     stable_items = module(meniscus, "addon.blender.properties").stable_items
     items = [(name, name.title(), name) for name in ("auto", "one", "two")]
@@ -64,19 +72,3 @@ def test_every_property_has_a_description_without_full_stop(meniscus):
             for text in texts:
                 assert text.strip(), own.identifier
                 assert not text.endswith("."), own.identifier
-
-
-def test_settings_and_panels_come_and_go_as_a_whole(meniscus):
-    properties, panels = module(meniscus, "addon.blender.properties"), module(meniscus, "addon.blender.panels")
-    names = ("MENISCUS_PT_object", "MENISCUS_PT_particles", "MENISCUS_PT_scene")
-    panels.unregister()
-    properties.unregister()
-    try:
-        assert not hasattr(bpy.types.Object, "meniscus")
-        assert not hasattr(bpy.types.Scene, "meniscus")
-        assert not any(hasattr(bpy.types, name) for name in names)
-    finally:
-        properties.register()
-        panels.register()
-    assert hasattr(bpy.types.Object, "meniscus")
-    assert all(hasattr(bpy.types, name) for name in names)
