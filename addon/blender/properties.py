@@ -11,10 +11,23 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
 from ..fluid.look import Look
-from .method_items import BACKENDS, method_items
+from ..render.registry import method_infos
 
 Item = tuple[str, str, str]
 NumberedItem = tuple[str, str, str, int]
+
+
+BACKENDS: tuple[Item, ...] = (
+    ("auto", "Automatic", "The graphics card where it can, else the processor"),
+    ("gpu", "GPU", "The graphics card, through OpenGL"),
+    ("cpu", "CPU", "The processor"),
+)
+
+
+def method_items() -> list[Item]:
+    """The registered methods, the automatic choice first."""
+    registered = [(info.name, info.label, info.description) for info in method_infos()]
+    return [("auto", "Automatic", "The fastest method that runs here"), *registered]
 
 
 def stable_items(items: Iterable[Item]) -> list[NumberedItem]:

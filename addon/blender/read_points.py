@@ -17,28 +17,41 @@ _VECTOR_TYPES = {"FLOAT_VECTOR": ("vector", 3, np.float32)}
 _COLOR_TYPES = {"FLOAT_COLOR": ("color", 4, np.float32), "BYTE_COLOR": ("color", 4, np.float32), **_VECTOR_TYPES}
 
 
-def read_points(source: Source) -> list[BallPart]:
+def read_points(source: Source, depsgraph: bpy.types.Depsgraph) -> list[BallPart]:
     """The points of a source's mesh or point cloud, as one part; none where there is no geometry.
 
     Parameters
     ----------
     source
         A fluid object. Its attributes are in its own space: positions, velocities and radii are carried to the world.
+    depsgraph
+        The dependency graph that evaluated it.
 
     Raises
     ------
     InputError
         The object can have no points, or they lack an attribute that the settings ask for.
     """
-    item, data = source.object, source.data
+    data = source.data
     if not isinstance(data, (bpy.types.Mesh, bpy.types.PointCloud)):
         _check_can_have_points(source)
         return []
+    if not (isinstance(data, bpy.types.Mesh) and data.is_editmode):
+        return _read_geometry(source, data)
+    # A mesh in edit mode shows no attributes, a copy does.
+    copy = source.object.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    try:
+        return _read_geometry(source, copy)
+    finally:
+        source.object.to_mesh_clear()
+
+
+def _read_geometry(source: Source, data: bpy.types.Mesh | bpy.types.PointCloud) -> list[BallPart]:
     positions = _attribute(data, "position", _VECTOR_TYPES)
     if positions is None or len(positions) == 0:
         return []
+    item, move = source.object, source.world_from_object
     velocities = _attribute(data, "velocity", _VECTOR_TYPES)
-    move = source.world_from_object
     return [
         BallPart(
             positions=transformed_points(positions, move),

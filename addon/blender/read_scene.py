@@ -62,7 +62,7 @@ def _parts_of(source: Source, depsgraph: bpy.types.Depsgraph, viewport: bool) ->
         raise InputError(f"'{source.object.name}' has no particle system: add one, or set its fluid source to Points")
     if choice == "PARTICLES" or (choice == "AUTO" and has_particle_systems(source.object)):
         return read_particles(source, depsgraph, viewport)
-    return read_points(source)
+    return read_points(source, depsgraph)
 
 
 def _joined(parts: Sequence[BallPart], scene_color: tuple[float, float, float]) -> Balls:

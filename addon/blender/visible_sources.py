@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -46,6 +46,10 @@ class Source:
         return self.world_from_object @ np.linalg.inv(original)
 
 
+ShownTest = Callable[[Source, bpy.types.Object], bool]
+"""Says whether a source is visible, given the object of the view layer that puts it where it is."""
+
+
 def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[Source]:
     """The fluid objects that are visible, at each place where they stand, instances too.
 
@@ -64,14 +68,23 @@ def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[
     fluid = {item.as_pointer() for item in depsgraph.ids if isinstance(item, bpy.types.Object) and item.meniscus.use_fluid}
     if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
         raise InputError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
-    if viewport or depsgraph.mode == "RENDER":
-        yield from (source for source, _ in _places(depsgraph, fluid))
-        return
-    renderable = _renderable_objects(depsgraph.view_layer)
-    _check_evaluated(depsgraph.view_layer, renderable)
+    is_shown = _shown_in_viewport(depsgraph) if viewport else _shown_in_render(depsgraph)
     for source, owner in _places(depsgraph, fluid):
-        if not source.object.hide_render and owner.original.as_pointer() in renderable:
+        if is_shown(source, owner):
             yield source
+
+
+def _shown_in_viewport(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    # The dependency graph also holds the objects of hidden collections, because a viewport may have its own choice of them.
+    return lambda source, owner: owner.original.visible_get(view_layer=depsgraph.view_layer)
+
+
+def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    if depsgraph.mode == "RENDER":
+        return lambda source, owner: True
+    renderable = _renderable_objects(depsgraph.view_layer)
+    _check_evaluated(depsgraph, renderable)
+    return lambda source, owner: not source.object.hide_render and owner.original.as_pointer() in renderable
 
 
 def _places(depsgraph: bpy.types.Depsgraph, fluid: set[int]) -> Iterator[tuple[Source, bpy.types.Object]]:
@@ -123,9 +136,10 @@ def _renderable_objects(view_layer: bpy.types.ViewLayer) -> set[int]:
     return found
 
 
-def _check_evaluated(view_layer: bpy.types.ViewLayer, renderable: set[int]) -> None:
-    for item in view_layer.objects:
-        if item.meniscus.use_fluid and item.as_pointer() in renderable and not item.visible_get(view_layer=view_layer):
+def _check_evaluated(depsgraph: bpy.types.Depsgraph, renderable: set[int]) -> None:
+    missing = renderable - {item.original.as_pointer() for item in depsgraph.objects}
+    for item in depsgraph.view_layer.objects:
+        if item.meniscus.use_fluid and item.as_pointer() in missing:
             raise InputError(
                 f"'{item.name}' is hidden in the viewport only, where Blender evaluates this render: "
                 "show it there, or disable it in renders too"
