@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -113,6 +114,15 @@ def no_opengl(monkeypatch):
     monkeypatch.setattr(registry.gpu(), "shared_context", fail)
     method = registry._import("gpu_shaders.methods.depth_peeling", "method")
     monkeypatch.setattr(method, "create", fail)
+
+
+@pytest.mark.parametrize(("is_software", "expected"), [(True, "exact_intervals"), (False, "depth_peeling")])
+def test_software_opengl_is_left_alone_unless_asked_for(monkeypatch, is_software, expected):
+    stand_in = SimpleNamespace(is_software=is_software)
+    monkeypatch.setattr(registry.gpu(), "shared_context", lambda: stand_in)
+    monkeypatch.setattr(renderer, "create_method", lambda name: (name, None))
+    assert renderer._pick_method("auto", "auto")[0] == expected
+    assert renderer._pick_method("auto", "gpu")[0] == "depth_peeling"
 
 
 def test_without_opengl_the_cpu_does_the_work(no_opengl):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from ...fluid.camera import Camera
+from ...fluid.camera import Camera, Region
 from ...fluid.field import Field
 from ...fluid.view_balls import ViewBalls
 from ..method import Surface
@@ -119,7 +120,8 @@ def _candidates(covered: IntArray, image_width: int, begin: int, end: int) -> tu
 
 def _rays(camera: Camera, begin: int, end: int) -> tuple[Rays, FloatArray]:
     """The view-space rays of the rows [begin, end), and their length for each unit of planar depth."""
-    origins, directions = (array[begin:end].reshape(-1, 3) for array in camera.view_rays())
+    band = replace(camera, region=Region(0, begin, camera.width, end))
+    origins, directions = (array.reshape(-1, 3) for array in band.view_rays())
     stretch: npt.NDArray[np.float64] = np.linalg.norm(directions, axis=1)
     rays = Rays(origins, directions / stretch[:, None], camera.clip_start * stretch, camera.clip_end * stretch)
     return rays, stretch
