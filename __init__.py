@@ -19,7 +19,7 @@ _HOMES = {
     "Look": ".addon.fluid.look",
     "MeniscusError": ".addon.fluid.errors",
     "methods": ".addon.render.registry",
-    "oracle": ".addon.render",
+    "oracle": ".addon.render.oracle",
     "render": ".addon.render.renderer",
     "write_exr": ".addon.output.exr",
 }
@@ -30,7 +30,8 @@ __all__ = [*_HOMES, "__version__"]
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    value = getattr(importlib.import_module(_HOMES[name], __name__), name)
+    module = importlib.import_module(_HOMES[name], __name__)
+    value = module if _HOMES[name].endswith(f".{name}") else getattr(module, name)
     globals()[name] = value
     return value
 

@@ -1,0 +1,192 @@
+"""Rendering without the user interface: ``blender -b scene.blend --command meniscus render ...``."""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import json
+import signal
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import bpy
+
+from ..fluid.errors import InputError, MeniscusError
+from ..output.frame_path import numbered_pattern
+from ..output.whole_file import whole_file
+from .command_line_arguments import parse_arguments
+from .render_frames import FrameReport, RenderJob, render_frames
+
+_commands: list[Any] = []
+"""What Blender gave for the registered command, to unregister it with."""
+
+
+def register() -> None:
+    """Make ``--command meniscus`` known to Blender."""
+    _commands.append(bpy.utils.register_cli_command("meniscus", main))
+    # Blender's Python module up to 4.5 crashes at its exit where a command is still registered.
+    atexit.register(unregister)
+
+
+def unregister() -> None:
+    """Take the command away."""
+    atexit.unregister(unregister)
+    bpy.utils.unregister_cli_command(_commands.pop())
+
+
+def main(arguments: list[str]) -> int:
+    """Do what the command line asks for.
+
+    Parameters
+    ----------
+    arguments
+        What follows ``--command meniscus``.
+
+    Returns
+    -------
+    The exit status: 0 if all was done, 1 if something failed, 2 if the arguments make no sense. Errors are one sentence
+    each on the standard error.
+    """
+    try:
+        options = parse_arguments(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    try:
+        return _render(options)
+    except MeniscusError as error:
+        _complain(error)
+        return 1
+
+
+def _render(options: argparse.Namespace) -> int:
+    job = _job(options)
+    progress = sys.stderr if options.json == "-" else sys.stdout
+    reports: list[FrameReport] = []
+    error = ""
+    try:
+        with _cancelled_by_signals() as is_cancelled:
+            for report in render_frames(job, is_cancelled):
+                reports.append(report)
+                _print_frame(report, f"{len(reports)}/{len(job.frames)}", progress)
+    except MeniscusError as stop:
+        error = str(stop)
+        _complain(stop)
+    _print_summary(job, reports, progress)
+    if options.json:
+        _write_json(options.json, {"frames_wanted": len(job.frames), "error": error, "frames": reports})
+    return 0 if _count_written(reports) == len(job.frames) else 1
+
+
+def _job(options: argparse.Namespace) -> RenderJob:
+    """What to render: the options, and the scene's own settings for what they leave open."""
+    scene = bpy.context.scene
+    frames = options.frames or tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    if not frames:
+        raise InputError(f"The scene's frame range {scene.frame_start} to {scene.frame_end} is empty; use --frames")
+    return RenderJob(
+        scene=scene,
+        view_layer=_view_layer(scene, options.view_layer),
+        camera=_camera(scene, options.camera),
+        frames=frames,
+        output=_output(options.output, len(frames)),
+        resolution=options.resolution,
+        passes=options.passes,
+        method=options.method or scene.meniscus.method,
+        backend=options.backend or scene.meniscus.backend,
+        compression=options.compression,
+        use_preview=options.preview,
+    )
+
+
+def _view_layer(scene: bpy.types.Scene, name: str | None) -> bpy.types.ViewLayer:
+    if name is None:
+        return bpy.context.view_layer
+    if name not in scene.view_layers:
+        raise InputError(f"The scene has no view layer '{name}': choose from {', '.join(scene.view_layers.keys())}")
+    return scene.view_layers[name]
+
+
+def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None:
+    if name is None:
+        return None
+    if name not in scene.objects:
+        raise InputError(f"The scene has no object '{name}' to use as its camera; check the name")
+    return scene.objects[name]
+
+
+def _output(pattern: str, frame_count: int) -> str:
+    """Absolute path with ``####`` where several frames need it."""
+    if pattern.startswith("//") and not bpy.data.filepath:
+        raise InputError(f"'{pattern}' is relative to the .blend file, but none is open; give an absolute path")
+    if pattern.endswith(("/", "\\")) or Path(bpy.path.abspath(pattern)).is_dir():
+        raise InputError(f"'{pattern}' is a folder; add a file name such as fluid_####.exr")
+    absolute = str(Path(bpy.path.abspath(pattern)).absolute())
+    if not absolute.lower().endswith(".exr"):
+        absolute += ".exr"
+    return absolute if frame_count == 1 else numbered_pattern(absolute)
+
+
+@contextmanager
+def _cancelled_by_signals() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C (or a farm's terminate) came; a second one ends Blender at once."""
+    cancelled = threading.Event()
+
+    def cancel(number: int, _: object) -> None:
+        cancelled.set()
+        signal.signal(number, signal.SIG_DFL)
+
+    # Blender's own handlers are unknown to Python (None) and cannot be put back.
+    before = {number: signal.signal(number, cancel) or signal.SIG_DFL for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield cancelled.is_set
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _print_frame(report: FrameReport, place: str, stream: TextIO) -> None:
+    head = f"Frame {report.frame} ({place})"
+    if report.error:
+        print(f"{head}: {report.error}", file=sys.stderr, flush=True)
+        return
+    balls, spent = report.info.counts.get("balls", 0), sum(report.info.milliseconds.values())
+    print(f"{head}: {balls:,} balls, {spent:,.0f} ms, {report.info.device}, {report.path}", file=stream, flush=True)
+    if report.left_out:
+        print(f"{head}: {report.left_out}", file=sys.stderr, flush=True)
+
+
+def _print_summary(job: RenderJob, reports: list[FrameReport], stream: TextIO) -> None:
+    written = _count_written(reports)
+    failed = sum(1 for report in reports if report.error)
+    parts = [f"Meniscus wrote {written} of {len(job.frames)} frames"]
+    if failed:
+        parts.append(f"{failed} failed")
+    if len(reports) < len(job.frames):
+        parts.append(f"{len(job.frames) - len(reports)} were not rendered")
+    dropped: Counter[str] = Counter()
+    for report in reports:
+        dropped.update(report.info.dropped)
+    parts += [f"{count} balls were left out because their {reason}" for reason, count in dropped.items()]
+    print("; ".join(parts), file=stream, flush=True)
+
+
+def _count_written(reports: list[FrameReport]) -> int:
+    return sum(1 for report in reports if not report.error)
+
+
+def _write_json(target: str, summary: dict[str, Any]) -> None:
+    text = json.dumps(summary, default=FrameReport.as_dict)
+    if target == "-":
+        print(text, flush=True)
+        return
+    with whole_file(target) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _complain(error: MeniscusError) -> None:
+    print(f"meniscus: {error}", file=sys.stderr, flush=True)

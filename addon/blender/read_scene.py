@@ -1,0 +1,94 @@
+"""The balls, the field and the look of a Blender scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.balls import Balls
+from ..fluid.errors import InputError
+from ..fluid.field import Field
+from ..fluid.look import Look
+from .ball_part import BallPart
+from .read_particles import has_particle_systems, read_particles
+from .read_points import read_points
+from .visible_sources import Source, visible_sources
+
+
+def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Balls:
+    """All balls of a scene at its current frame, in world space.
+
+    Parameters
+    ----------
+    depsgraph
+        Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
+    viewport
+        Whether to read what the viewport shows rather than what a render shows.
+
+    Returns
+    -------
+    Balls
+        Of all sources together; none where the sources are hidden or have no particle at this frame. Ids are there where
+        a single source has them, because those of several would clash.
+
+    Raises
+    ------
+    InputError
+        No object is used as fluid, or one lacks what its settings ask for.
+    """
+    parts: list[BallPart] = []
+    for source in visible_sources(depsgraph, viewport):
+        parts.extend(_parts_of(source, depsgraph, viewport))
+    return _joined([part for part in parts if len(part)], read_look(depsgraph.scene_eval).color)
+
+
+def read_field(scene: bpy.types.Scene) -> Field:
+    """The density field that the scene's settings describe."""
+    return Field(kernel=scene.meniscus.kernel, isovalue=scene.meniscus.isovalue)
+
+
+def read_look(scene: bpy.types.Scene) -> Look:
+    """The colour and light that the scene's settings describe."""
+    return Look(color=tuple(scene.meniscus.color), ambient=scene.meniscus.ambient)
+
+
+def _parts_of(source: Source, depsgraph: bpy.types.Depsgraph, viewport: bool) -> list[BallPart]:
+    choice = source.object.meniscus.source
+    if choice == "PARTICLES" and not has_particle_systems(source.object):
+        raise InputError(f"'{source.object.name}' has no particle system: add one, or set its fluid source to Points")
+    if choice == "PARTICLES" or (choice == "AUTO" and has_particle_systems(source.object)):
+        return read_particles(source, depsgraph, viewport)
+    return read_points(source, depsgraph)
+
+
+def _joined(parts: Sequence[BallPart], scene_color: tuple[float, float, float]) -> Balls:
+    """All parts as one; what only some of them have is filled with what holds for the others."""
+    if not parts:
+        return Balls(np.empty((0, 3), np.float32), np.empty(0, np.float32))
+    return Balls(
+        positions=_concatenated(parts, lambda part: part.positions, (3,)),
+        radii=_concatenated(parts, lambda part: part.radii, ()),
+        weights=_concatenated(parts, lambda part: part.weight, ()),
+        colors=_optional(parts, lambda part: part.colors, scene_color),
+        velocities=_optional(parts, lambda part: part.velocities, (0.0, 0.0, 0.0)),
+        ids=parts[0].ids if len(parts) == 1 else None,
+    )
+
+
+def _optional(
+    parts: Sequence[BallPart], values_of: Callable[[BallPart], Any], default: tuple[float, ...]
+) -> npt.NDArray[np.float32] | None:
+    if all(values_of(part) is None for part in parts):
+        return None
+    return _concatenated(parts, lambda part: default if values_of(part) is None else values_of(part), (3,))
+
+
+def _concatenated(
+    parts: Sequence[BallPart], values_of: Callable[[BallPart], Any], tail: tuple[int, ...]
+) -> npt.NDArray[np.float32]:
+    columns = [np.broadcast_to(np.asarray(values_of(part), np.float32), (len(part), *tail)) for part in parts]
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)

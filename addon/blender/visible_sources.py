@@ -1,0 +1,146 @@
+"""Which objects of a scene supply balls, and where they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.errors import InputError
+
+
+@dataclass(frozen=True)
+class Source:
+    """A fluid object at one place in the scene. Valid only until the next one is taken.
+
+    Attributes
+    ----------
+    object
+        The evaluated object that carries the settings.
+    data
+        Its geometry, or the further geometry that its modifiers make; None for objects without data.
+    world_from_object
+        (4, 4) float64, of this place; that of an instance differs from the object's own.
+    """
+
+    object: bpy.types.Object
+    data: bpy.types.ID | None
+    world_from_object: npt.NDArray[np.float64]
+
+    @property
+    def is_object_itself(self) -> bool:
+        """Whether `data` is the object's own, not one of the further geometries that its modifiers make."""
+        return self.data == self.object.data
+
+    @property
+    def world_from_original(self) -> npt.NDArray[np.float64]:
+        """(4, 4): carries what is in world space at the object's own place to this place."""
+        original = np.array(self.object.matrix_world, np.float64)
+        if np.array_equal(original, self.world_from_object):
+            return np.eye(4)
+        if np.linalg.det(original[:3, :3]) == 0:
+            raise InputError(f"The instances of '{self.object.name}' cannot be placed: give it a scale other than 0")
+        return self.world_from_object @ np.linalg.inv(original)
+
+
+ShownTest = Callable[[Source, bpy.types.Object], bool]
+"""Says whether a source is visible, given the object of the view layer that puts it where it is."""
+
+
+def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[Source]:
+    """The fluid objects that are visible, at each place where they stand, instances too.
+
+    Parameters
+    ----------
+    depsgraph
+        Evaluated dependency graph.
+    viewport
+        Whether visibility in the viewport counts rather than visibility in renders.
+
+    Raises
+    ------
+    InputError
+        No object is used as fluid, or a render shows one that the viewport's dependency graph does not hold.
+    """
+    fluid = {item.as_pointer() for item in depsgraph.ids if isinstance(item, bpy.types.Object) and item.meniscus.use_fluid}
+    if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
+        raise InputError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
+    is_shown = _shown_in_viewport(depsgraph) if viewport else _shown_in_render(depsgraph)
+    for source, owner in _places(depsgraph, fluid):
+        if is_shown(source, owner):
+            yield source
+
+
+def _shown_in_viewport(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    # The dependency graph also holds the objects of hidden collections, because a viewport may have its own choice of them.
+    return lambda source, owner: owner.original.visible_get(view_layer=depsgraph.view_layer)
+
+
+def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    if depsgraph.mode == "RENDER":
+        return lambda source, owner: True
+    renderable = _renderable_objects(depsgraph.view_layer)
+    _check_evaluated(depsgraph, renderable)
+    return lambda source, owner: not source.object.hide_render and owner.original.as_pointer() in renderable
+
+
+def _places(depsgraph: bpy.types.Depsgraph, fluid: set[int]) -> Iterator[tuple[Source, bpy.types.Object]]:
+    """Each place of the objects in `fluid` (addresses), with the object of the view layer that puts it there."""
+    # Walking instances is slow where particles are drawn as many objects, so it is done only where fluid may be among them.
+    if not any(_may_instance_fluid(item) for item in depsgraph.objects):
+        for item in depsgraph.objects:
+            if item.as_pointer() in fluid:
+                yield Source(item, item.data, np.array(item.matrix_world, np.float64)), item
+        return
+    for instance in depsgraph.object_instances:
+        item = instance.instance_object if instance.is_instance else instance.object
+        if item.as_pointer() in fluid:
+            place = np.array(instance.matrix_world, np.float64)
+            yield Source(item, instance.object.data, place), instance.parent if instance.is_instance else item
+
+
+def _may_instance_fluid(item: bpy.types.Object) -> bool:
+    if item.instance_type != "NONE" or any(modifier.type == "NODES" for modifier in item.modifiers):
+        return True
+    instanced = (found for system in item.particle_systems for found in _instanced_objects(system.settings))
+    return any(_may_be_fluid(found) for found in instanced)
+
+
+def _may_be_fluid(item: bpy.types.Object) -> bool:
+    return item.meniscus.use_fluid or item.instance_type != "NONE" or len(item.modifiers) > 0
+
+
+def _instanced_objects(settings: bpy.types.ParticleSettings) -> list[bpy.types.Object]:
+    """The objects that a particle system draws in place of its particles."""
+    if settings.render_type == "OBJECT" and settings.instance_object:
+        return [settings.instance_object]
+    if settings.render_type == "COLLECTION" and settings.instance_collection:
+        return list(settings.instance_collection.all_objects)
+    return []
+
+
+def _renderable_objects(view_layer: bpy.types.ViewLayer) -> set[int]:
+    """Addresses of the original objects of a view layer that a render shows."""
+    found: set[int] = set()
+    pending = [view_layer.layer_collection]
+    while pending:
+        layer_collection = pending.pop()
+        if layer_collection.collection.hide_render:
+            continue
+        pending.extend(layer_collection.children)
+        if not layer_collection.exclude:
+            found.update(item.as_pointer() for item in layer_collection.collection.objects if not item.hide_render)
+    return found
+
+
+def _check_evaluated(depsgraph: bpy.types.Depsgraph, renderable: set[int]) -> None:
+    missing = renderable - {item.original.as_pointer() for item in depsgraph.objects}
+    for item in depsgraph.view_layer.objects:
+        if item.meniscus.use_fluid and item.as_pointer() in missing:
+            raise InputError(
+                f"'{item.name}' is hidden in the viewport only, where Blender evaluates this render: "
+                "show it there, or disable it in renders too"
+            )

@@ -1,0 +1,73 @@
+"""What runs in the child process of :mod:`exr_process`: takes file contents from a pipe and writes them.
+
+A request is one line of JSON (path, attributes and, by channel, name, type and shape), then the channels' bytes in the same
+order. The answer is one line of JSON: the error's sentence, empty where all went well.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from io import BufferedReader, BufferedWriter
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.errors import MeniscusError
+from .exr import ExrContent, write_content
+
+
+def send_request(stream: IO[bytes], path: str, content: ExrContent) -> None:
+    """The parent's side: ask for `content` to be written to `path`."""
+    channels = [[name, values.dtype.name, values.shape] for name, values in content.channels.items()]
+    head = {"path": path, "attributes": content.attributes, "channels": channels}
+    stream.write(json.dumps(head).encode() + b"\n")
+    for values in content.channels.values():
+        stream.write(values.data)
+    stream.flush()
+
+
+def read_answer(stream: IO[bytes]) -> str | None:
+    """The parent's side: the error's sentence, empty where all went well; None if the child has ended."""
+    line = stream.readline()
+    return json.loads(line) if line.endswith(b"\n") else None
+
+
+def serve() -> None:
+    """The child's side: answer requests until the parent closes the pipe."""
+    # Ctrl-C reaches the whole process group, but the parent decides when to stop: a file that was begun is finished.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # An exit by exception, so that a temporary file is removed.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    requests = os.fdopen(sys.stdin.fileno(), "rb", closefd=False)
+    with _private_stdout() as answers:
+        while head := requests.readline():
+            answers.write(json.dumps(_answer(requests, head)).encode() + b"\n")
+            answers.flush()
+
+
+def _private_stdout() -> BufferedWriter:
+    """The pipe to the parent; what a library prints goes to the standard error instead."""
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    return answers
+
+
+def _answer(requests: BufferedReader, head_line: bytes) -> str:
+    head = json.loads(head_line)
+    channels = {name: _read_array(requests, dtype, shape) for name, dtype, shape in head["channels"]}
+    try:
+        write_content(head["path"], ExrContent(head["attributes"], channels))
+    except MeniscusError as error:
+        return str(error)
+    return ""
+
+
+def _read_array(stream: BufferedReader, dtype: str, shape: list[int]) -> npt.NDArray[Any]:
+    values = np.empty(shape, dtype)
+    if stream.readinto(values.data.cast("B")) != values.nbytes:
+        sys.exit("Meniscus ended in the middle of an image, which was not written")
+    return values

@@ -1,0 +1,106 @@
+"""Polynomials in Bernstein form on [0, 1], many at a time: arrays (count, degree + 1) float64."""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+import numpy.typing as npt
+
+from ...fluid.kernels import Kernel
+
+FloatArray = npt.NDArray[np.float64]
+
+# Segments are not split below this width. A double cannot tell the two halves of a narrower one apart safely.
+_MIN_WIDTH = 2.0**-44
+
+
+def product(p: FloatArray, q: FloatArray) -> FloatArray:
+    """Bernstein form of p q; degrees add."""
+    degree_p, degree_q = p.shape[1] - 1, q.shape[1] - 1
+    result = np.zeros((len(p), degree_p + degree_q + 1))
+    for i in range(degree_p + 1):
+        for j in range(degree_q + 1):
+            share = comb(degree_p, i) * comb(degree_q, j) / comb(degree_p + degree_q, i + j)
+            result[:, i + j] += share * p[:, i] * q[:, j]
+    return result
+
+
+def compose(kernel: Kernel, x: FloatArray) -> FloatArray:
+    """Bernstein form of ``f(x(u))`` for quadratics ``x``, (count, 3): Horner's scheme with Bernstein products.
+
+    Adding a constant to a polynomial in Bernstein form adds it to every coefficient.
+    """
+    leading, *rest = reversed(kernel.coefficients)
+    result: FloatArray = np.full((len(x), 1), leading)
+    for coefficient in rest:
+        result = product(result, x) + coefficient
+    return result
+
+
+def restrict(p: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """`p` on the segments [low, high], (count,) each, as polynomials on [0, 1] (de Casteljau twice)."""
+    right = _part_from(p, low)
+    # What is left of `high` in the part right of `low`; its own parameter is stretched.
+    stretched = np.divide(high - low, 1 - low, out=np.zeros_like(low), where=low < 1)
+    return _part_from(right[:, ::-1], 1 - stretched)[:, ::-1]
+
+
+def _part_from(p: FloatArray, u: FloatArray) -> FloatArray:
+    """The part of `p` right of `u`, as a polynomial on [0, 1]."""
+    part = p.copy()
+    u = u[:, None]
+    for last in range(p.shape[1] - 1, 0, -1):
+        part[:, :last] += u * (part[:, 1 : last + 1] - part[:, :last])
+    return part
+
+
+def value(p: FloatArray, u: FloatArray) -> FloatArray:
+    """``p(u)``, (count,)."""
+    return _part_from(p, u)[:, 0]
+
+
+def first_root(p: FloatArray) -> FloatArray:
+    """The least u in [0, 1] with ``p(u) >= 0``, NaN where p is negative throughout; (count,).
+
+    The control polygon bounds the polynomial. A segment whose coefficients are all negative is passed over, one with a
+    single change of sign from - to + holds one root, any other is halved.
+    """
+    root = np.full(len(p), np.nan)
+    index = np.flatnonzero(p.max(axis=1) >= 0)
+    low: FloatArray = np.zeros(len(index))
+    width: FloatArray = np.ones(len(index))
+    while len(index):
+        segment = restrict(p[index], low, np.minimum(low + width, 1))
+        reached = segment[:, 0] >= 0
+        clear = segment.max(axis=1) < 0
+        single = ~reached & (segment[:, -1] >= 0) & (np.count_nonzero(np.diff(segment >= 0, axis=1), axis=1) == 1)
+        narrow = ~clear & ~reached & ~single & (width <= _MIN_WIDTH)
+        root[index[reached | narrow]] = low[reached | narrow]
+        root[index[single]] = low[single] + width[single] * _bracketed_root(segment[single])
+        # Pass over a clear segment to the next one of the binary tree, halve an undecided one.
+        low = np.where(clear, low + width, low)
+        climbs = clear & (np.mod(low, 2 * width) == 0)
+        width = np.where(clear, np.where(climbs, 2 * width, width), width / 2)
+        going = ~(reached | narrow | single) & (low < 1)
+        index, low, width = index[going], low[going], width[going]
+    return root
+
+
+def _bracketed_root(p: FloatArray) -> FloatArray:
+    """The one root of each polynomial with ``p(0) < 0 <= p(1)``: Newton's method, bisection where it leaves the bracket."""
+    low: FloatArray = np.zeros(len(p))
+    high: FloatArray = np.ones(len(p))
+    u: FloatArray = np.full(len(p), 0.5)
+    slope_of = np.diff(p, axis=1) * (p.shape[1] - 1)
+    for _ in range(200):
+        height = value(p, u)
+        low, high = np.where(height < 0, u, low), np.where(height < 0, high, u)
+        slope = value(slope_of, u)
+        newton = u - np.divide(height, slope, out=np.full_like(u, np.inf), where=slope > 0)
+        following = np.where((newton > low) & (newton < high), newton, (low + high) / 2)
+        step = np.abs(following - u)
+        u = following
+        if step.max(initial=0.0) < 1e-14:
+            break
+    return u

@@ -1,0 +1,104 @@
+"""The methods there are. A new one is its folder and one line here."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+from ..fluid.errors import DeviceError, InputError
+from .method import Backend, Method, MethodInfo
+
+_PACKAGE = __package__.rpartition(".addon.")[0]
+
+# Folders with `params.py` (METHOD, loads nothing heavy) and `method.py` (create()); the preferred first.
+_FOLDERS = (
+    "gpu_shaders.methods.depth_peeling",
+    "addon.render.exact_intervals",
+)
+
+
+@dataclass(frozen=True)
+class MethodStatus:
+    """A registered method, and whether it can run on this machine.
+
+    Attributes
+    ----------
+    info
+        What it is.
+    problem
+        One sentence that says why it cannot run here, empty if it can.
+    """
+
+    info: MethodInfo
+    problem: str
+
+    @property
+    def name(self) -> str:
+        """Identifier of the method."""
+        return self.info.name
+
+    @property
+    def label(self) -> str:
+        """What the user interface calls it."""
+        return self.info.label
+
+    @property
+    def description(self) -> str:
+        """What it is, for tooltips."""
+        return self.info.description
+
+    @property
+    def backend(self) -> Backend:
+        """The back-end that it belongs to."""
+        return self.info.backend
+
+
+def _import(folder: str, module: str) -> Any:
+    return importlib.import_module(f"{_PACKAGE}.{folder}.{module}")
+
+
+def method_infos() -> list[MethodInfo]:
+    """All registered methods, in order of preference. Loads no GPU module, so the interface may call it at start."""
+    return [_import(folder, "params").METHOD for folder in _FOLDERS]
+
+
+def methods() -> list[MethodStatus]:
+    """All registered methods, in order of preference, and whether each runs here. Opens the GPU to find out."""
+    return [MethodStatus(info, _problem(info)) for info in method_infos()]
+
+
+def create_method(name: str) -> tuple[MethodInfo, Method]:
+    """The method called `name`, ready to run.
+
+    Raises
+    ------
+    InputError
+        There is no such method.
+    DeviceError
+        It cannot run on this machine.
+    """
+    for folder in _FOLDERS:
+        info: MethodInfo = _import(folder, "params").METHOD
+        if info.name == name:
+            return info, _import(folder, "method").create()
+    raise InputError(f"Unknown method '{name}': choose auto, {', '.join(info.name for info in method_infos())}")
+
+
+def gpu() -> ModuleType:
+    """The module that owns the OpenGL context; raises DeviceError where its packages are missing."""
+    try:
+        return importlib.import_module(f"{_PACKAGE}.gpu_shaders.context")
+    except ImportError as error:
+        raise DeviceError(f"OpenGL cannot be used because a package is missing ({error}); reinstall the extension") from error
+
+
+def _problem(info: MethodInfo) -> str:
+    if info.backend == "cpu":
+        return ""
+    try:
+        gpu().shared_context().require(info.gl_version)
+    except DeviceError as error:
+        return str(error)
+    return ""

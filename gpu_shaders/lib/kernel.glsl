@@ -1,0 +1,67 @@
+// The density kernels, and their polynomials over an interval of a ray in Bernstein form.
+// f(x) = x^KERNEL_POWER (KERNEL_LOW + KERNEL_HIGH x); KERNEL_DEGREE: 2, 4, 6 or 8, its degree along a ray.
+#include "lib/ball.glsl"
+
+float kernel_power(float x) {
+    float result = x;
+    for (int i = 1; i < KERNEL_POWER; i++)
+        result *= x;
+    return result;
+}
+
+float kernel_value(float x) {
+    return x <= 0.0 ? 0.0 : kernel_power(x) * (KERNEL_LOW + KERNEL_HIGH * x);
+}
+
+float kernel_derivative(float x) {
+    return x <= 0.0 ? 0.0 : kernel_power(x) * (float(KERNEL_POWER) * KERNEL_LOW / x + float(KERNEL_POWER + 1) * KERNEL_HIGH);
+}
+
+// x over [begin, end] as a quadratic in Bernstein form.
+vec3 kernel_chord_bernstein(Chord chord, float begin, float end) {
+    float from = (begin - chord.middle) / chord.radius;
+    float to = (end - chord.middle) / chord.radius;
+    return chord.peak - vec3(from * from, from * to, to * to);
+}
+
+// Adds weight f(x) over [begin, end] to the coefficients (Kanamori et al. 2008, appendix A; here the products of the
+// quadratic x replace the clipping of the polynomial of the whole chord: fewer operations, and nothing cancels).
+void kernel_add_bernstein(inout float total[KERNEL_DEGREE + 1], Chord chord, float weight, float begin, float end) {
+    vec3 x = kernel_chord_bernstein(chord, begin, end);
+#if KERNEL_DEGREE == 2
+    total[0] += weight * x[0];
+    total[1] += weight * x[1];
+    total[2] += weight * x[2];
+#else
+    // x^2
+    float s0 = x[0] * x[0], s1 = x[0] * x[1], s2 = (x[0] * x[2] + 2.0 * x[1] * x[1]) / 3.0, s3 = x[1] * x[2], s4 = x[2] * x[2];
+#if KERNEL_DEGREE == 4
+    total[0] += weight * s0;
+    total[1] += weight * s1;
+    total[2] += weight * s2;
+    total[3] += weight * s3;
+    total[4] += weight * s4;
+#elif KERNEL_DEGREE == 6
+    // x^2 y
+    vec3 y = weight * (KERNEL_LOW + KERNEL_HIGH * x);
+    total[0] += s0 * y[0];
+    total[1] += (2.0 * s1 * y[0] + s0 * y[1]) / 3.0;
+    total[2] += (6.0 * s2 * y[0] + 8.0 * s1 * y[1] + s0 * y[2]) / 15.0;
+    total[3] += (s3 * y[0] + 3.0 * s2 * y[1] + s1 * y[2]) / 5.0;
+    total[4] += (s4 * y[0] + 8.0 * s3 * y[1] + 6.0 * s2 * y[2]) / 15.0;
+    total[5] += (s4 * y[1] + 2.0 * s3 * y[2]) / 3.0;
+    total[6] += s4 * y[2];
+#else
+    // (x^2)^2
+    total[0] += weight * s0 * s0;
+    total[1] += weight * s0 * s1;
+    total[2] += weight * (3.0 * s0 * s2 + 4.0 * s1 * s1) / 7.0;
+    total[3] += weight * (s0 * s3 + 6.0 * s1 * s2) / 7.0;
+    total[4] += weight * (s0 * s4 + 16.0 * s1 * s3 + 18.0 * s2 * s2) / 35.0;
+    total[5] += weight * (s1 * s4 + 6.0 * s2 * s3) / 7.0;
+    total[6] += weight * (3.0 * s2 * s4 + 4.0 * s3 * s3) / 7.0;
+    total[7] += weight * s3 * s4;
+    total[8] += weight * s4 * s4;
+#endif
+#endif
+}

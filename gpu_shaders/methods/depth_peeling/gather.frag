@@ -1,0 +1,33 @@
+// Adds a ball's pull on the gradient and its share of the colour at the surface, by blending (Kanamori et al. 2008,
+// section 4, step 4).
+#include "lib/kernel.glsl"
+#include "methods/depth_peeling/state.glsl"
+
+uniform usampler2D state_tx;
+uniform sampler2D color_tx;
+
+flat in uint v_id;
+layout(location = 0) out vec4 out_gradient; // view space, against the gradient
+layout(location = 1) out vec4 out_color;    // times the density, density
+
+void main() {
+    State state = state_unpack(texelFetch(state_tx, ivec2(gl_FragCoord.xy), 0).xy);
+    if (state.state != STATE_DONE || state.depth == NO_SURFACE)
+        discard;
+    Ray ray = ray_from_pixel(gl_FragCoord.xy);
+    Ball ball = ball_fetch(v_id);
+    Chord chord = ball_chord(ball, ray);
+    float from_middle = (state.depth / depth_scale - chord.middle) / chord.radius;
+    float x = chord.peak - from_middle * from_middle;
+    if (x <= 0.0)
+        discard;
+    vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
+    // From the centre to the middle of the chord, then along the chord.
+    vec2 offset = ball.center.xy - ray.origin + ball.center.z * ray.slope;
+    vec3 to_middle = -vec3(offset, 0.0) + direction * (dot(offset, ray.slope) / ray.stretch);
+    vec3 from_center = to_middle / chord.radius + direction * from_middle;
+    float weight = ball_density(v_id).x;
+    out_gradient = vec4(weight * kernel_derivative(x) / chord.radius * from_center, 0.0);
+    float share = max(weight * kernel_value(x), 0.0);
+    out_color = vec4(share * texelFetch(color_tx, ball_texel(v_id), 0).rgb, share);
+}

@@ -1,0 +1,74 @@
+"""The settings of objects and scenes: what they mean, and that they are saved."""
+
+import importlib
+
+import bpy
+import pytest
+from fluid_scenes import add_points
+
+
+def module(meniscus, name):
+    return importlib.import_module(f"{meniscus.__name__}.{name}")
+
+
+def own_properties(group):
+    return [group.bl_rna.properties[name] for name in group.__annotations__]
+
+
+def test_field_and_look_of_a_new_scene_are_the_defaults(meniscus, empty_scene):
+    reader = module(meniscus, "addon.blender.read_scene")
+    field, look = module(meniscus, "addon.fluid.field").Field(), module(meniscus, "addon.fluid.look").Look()
+    read_field, read_look = reader.read_field(empty_scene), reader.read_look(empty_scene)
+    assert (read_field.kernel, read_field.isovalue) == (field.kernel, pytest.approx(field.isovalue))
+    assert (read_look.color, read_look.ambient) == (pytest.approx(look.color), pytest.approx(look.ambient))
+
+
+def test_field_and_look_are_those_of_the_scene(meniscus, empty_scene):
+    reader = module(meniscus, "addon.blender.read_scene")
+    settings = empty_scene.meniscus
+    settings.isovalue, settings.color, settings.ambient = 0.75, (0.5, 0.25, 0.125), 0.5
+    for kernel in module(meniscus, "addon.fluid.kernels").KERNELS:
+        settings.kernel = kernel
+        assert reader.read_field(empty_scene).kernel == kernel
+    assert reader.read_field(empty_scene).isovalue == 0.75
+    look = reader.read_look(empty_scene)
+    assert (look.color, look.ambient) == ((0.5, 0.25, 0.125), 0.5)
+
+
+def test_settings_survive_saving_and_loading(meniscus, empty_scene, tmp_path):
+    item = add_points(empty_scene.collection)
+    item.meniscus.radius_mode, item.meniscus.weight = "FIXED", -1.5
+    empty_scene.meniscus.kernel, empty_scene.meniscus.backend = "poly6", "cpu"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "fluid.blend"), check_existing=False)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "fluid.blend"))
+    settings, scene_settings = bpy.data.objects["Points"].meniscus, bpy.context.scene.meniscus
+    assert (settings.use_fluid, settings.radius_mode, settings.weight) == (True, "FIXED", -1.5)
+    assert (scene_settings.kernel, scene_settings.backend) == ("poly6", "cpu")
+
+
+def test_every_registered_method_can_be_chosen(meniscus, empty_scene):
+    names = [info.name for info in module(meniscus, "addon.render.registry").method_infos()]
+    assert names
+    for name in ("auto", *names):
+        empty_scene.meniscus.method = name
+        assert empty_scene.meniscus.method == name
+
+
+def test_number_of_a_choice_does_not_depend_on_the_other_choices(meniscus):
+    stable_items = module(meniscus, "addon.blender.properties").stable_items
+    items = [(name, name.title(), name) for name in ("auto", "one", "two")]
+    numbers = {name: number for name, _, _, number in stable_items(items)}
+    with_a_new_one = {name: number for name, _, _, number in stable_items([("new", "New", ""), *reversed(items)])}
+    assert numbers.items() <= with_a_new_one.items()
+    assert len(set(with_a_new_one.values())) == 4
+
+
+def test_every_property_has_a_description_without_full_stop(meniscus):
+    properties = module(meniscus, "addon.blender.properties")
+    for group in (properties.MENISCUS_PG_object, properties.MENISCUS_PG_scene):
+        for own in own_properties(group):
+            texts = [own.description, *(item.description for item in getattr(own, "enum_items", ()))]
+            for text in texts:
+                assert text.strip(), own.identifier
+                assert not text.endswith("."), own.identifier

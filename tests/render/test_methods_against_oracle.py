@@ -1,0 +1,70 @@
+"""Every registered method, on every scene, in both projections, against the oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from judge import judge
+from scenes import SCENES
+
+import meniscus
+from meniscus.addon.render.registry import method_infos
+
+METHODS = [info.name for info in method_infos()]
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("method", METHODS)
+def test_surface_matches_oracle(method, scene_name, projection):
+    scene = SCENES[scene_name]()
+    camera = scene.camera(projection)
+    image = meniscus.render(scene.balls, camera, scene.field, method=method)
+    assert 0.02 < image.hit.mean() <= 1.0, "the scene should show something"
+    judge(image, scene, camera)
+
+
+@pytest.mark.parametrize("scene_name", ["ten_balls", "coincident_balls", "lattice_with_droplets", "eye_inside_fluid"])
+def test_depth_peeling_is_exact_where_lists_overflow(scene_name, depth_peeling_with_list_of):
+    scene = SCENES[scene_name]()
+    camera = scene.camera("perspective")
+    image = depth_peeling_with_list_of(2, scene, camera)
+    assert image.info.counts["overflows"] > 100
+    judge(image, scene, camera)
+
+
+def test_overflow_is_counted_only_where_it_happens():
+    scene = SCENES["long_lists"]()
+    camera = scene.camera("perspective")
+    assert meniscus.render(scene.balls, camera, scene.field, method="depth_peeling").info.counts["overflows"] > 100
+    scene = SCENES["ten_balls"]()
+    assert meniscus.render(scene.balls, camera, scene.field, method="depth_peeling").info.counts["overflows"] == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_colors_blend_by_their_share_of_the_density(method):
+    # Half way between two equal balls both colours count alike; on the far side of one only its own.
+    balls = meniscus.Balls([[-0.3, 0, 0], [0.3, 0, 0]], 0.8, colors=[[1, 0, 0], [0, 0, 1]])
+    camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=41, height=41)
+    look = meniscus.Look(ambient=1.0)
+    image = meniscus.render(balls, camera, meniscus.Field(), method=method, passes=("combined",), look=look)
+    row = image["combined"][20]
+    np.testing.assert_allclose(row[20], [0.5, 0, 0.5, 1], atol=1e-5)
+    np.testing.assert_allclose(row[7], [1, 0, 0, 1], atol=1e-5)
+    np.testing.assert_allclose(row[33], [0, 0, 1, 1], atol=1e-5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_balls_give_an_empty_image(method):
+    camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=8, height=6)
+    image = meniscus.render(meniscus.Balls(np.zeros((0, 3)), 1.0), camera, meniscus.Field(), method=method)
+    assert not image.hit.any()
+    assert np.all(image["depth"] == np.float32(1e10))
+    assert np.all(image["normal"] == 0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_balls_without_a_surface_give_an_empty_image(method):
+    camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=32, height=24)
+    balls = meniscus.Balls([[0, 0, 0], [0.1, 0, 0]], 1.0, weights=[0.05, -1])
+    assert not meniscus.render(balls, camera, meniscus.Field(), method=method).hit.any()

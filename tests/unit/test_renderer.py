@@ -1,0 +1,141 @@
+"""The renderer: passes, regions, choices, errors. On the CPU, so that it runs anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import meniscus
+from meniscus.addon.fluid.camera import Region
+from meniscus.addon.fluid.errors import CancelledError, DeviceError, InputError
+from meniscus.addon.render import registry, renderer
+
+BALLS = meniscus.Balls([[-0.3, 0, 0], [0.4, 0.2, 0.1]], 0.9)
+CAMERA = meniscus.Camera.perspective((0.5, -4, 1), (0, 0, 0), fov_y=0.6, width=48, height=36)
+ALL_PASSES = ("combined", "depth", "normal", "position")
+
+
+def render(camera=CAMERA, balls=BALLS, **options):
+    return meniscus.render(balls, camera, meniscus.Field(), **{"backend": "cpu", "passes": ALL_PASSES, **options})
+
+
+def test_images_have_their_shapes_types_and_backgrounds():
+    image = render()
+    assert {name: image[name].shape for name in ALL_PASSES} == {
+        "combined": (36, 48, 4),
+        "depth": (36, 48),
+        "normal": (36, 48, 3),
+        "position": (36, 48, 3),
+    }
+    assert all(image[name].dtype == np.float32 for name in ALL_PASSES)
+    assert 0.05 < image.hit.mean() < 0.9
+    assert np.all(image["depth"][~image.hit] == np.float32(1e10))
+    assert not any(image[name][~image.hit].any() for name in ("combined", "normal", "position"))
+    assert np.all(image["combined"][image.hit][:, 3] == 1)
+
+
+def test_row_zero_is_at_the_bottom():
+    low = meniscus.Balls([[0, 0, -0.6]], 0.5)
+    camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=8, height=8)
+    hit = render(camera, low).hit
+    assert hit[:4].any()
+    assert not hit[4:].any()
+
+
+def test_position_lies_on_the_ray_at_the_depth():
+    image = render()
+    world = np.concatenate([image["position"][image.hit], np.ones((image.hit.sum(), 1))], axis=1)
+    in_view = world @ CAMERA.view_from_world.T
+    np.testing.assert_allclose(-in_view[:, 2], image["depth"][image.hit], atol=1e-5)
+    clip = in_view @ CAMERA.clip_from_view.T
+    pixels = (clip[:, :2] / clip[:, 3:] + 1) / 2 * (48, 36) - 0.5
+    rows, columns = np.nonzero(image.hit)
+    np.testing.assert_allclose(pixels, np.stack([columns, rows], 1), atol=1e-3)
+
+
+def test_headlight_is_brightest_where_the_surface_faces_the_eye():
+    camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=21, height=21)
+    look = meniscus.Look(color=(0.5, 0.25, 1.0), ambient=0.2)
+    row = render(camera, meniscus.Balls([[0, 0, 0]], 0.9), look=look)["combined"][10]
+    np.testing.assert_allclose(row[10, :3], (0.5, 0.25, 1.0), atol=1e-4)
+    lit = row[row[:, 3] > 0][:, 0]
+    assert np.all(np.diff(lit[: len(lit) // 2 + 1]) > 0)
+    assert lit[0] > 0.2 * 0.5
+
+
+def test_region_is_the_same_part_of_the_whole_image():
+    region = Region(10, 6, 30, 25)
+    whole, part = render(), render(replace(CAMERA, region=region))
+    inside = np.zeros_like(whole.hit)
+    inside[6:25, 10:30] = True
+    np.testing.assert_array_equal(part.hit, whole.hit & inside)
+    np.testing.assert_allclose(part["depth"][inside], whole["depth"][inside], rtol=1e-6)
+    assert np.all(part["depth"][~inside] == np.float32(1e10))
+
+
+def test_info_says_what_happened():
+    balls = meniscus.Balls([[0, 0, 0], [np.nan, 0, 0], [500, 0, 0]], 0.5)
+    info = render(balls=balls).info
+    assert (info.method, info.backend) == ("exact_intervals", "cpu")
+    assert "CPU" in info.device
+    assert info.counts["balls"] == 2
+    assert info.counts["balls_drawn"] == 1
+    assert info.dropped == {"position is not finite": 1}
+    assert list(info.milliseconds) == ["view", "surface", "passes"]
+
+
+def test_cancelling_stops_the_render():
+    with pytest.raises(CancelledError):
+        render(is_cancelled=lambda: True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, depth_peeling"),
+        ({"backend": "tpu"}, "Unknown back-end 'tpu'"),
+        ({"method": "depth_peeling", "backend": "cpu"}, "runs on the back-end 'gpu', not on 'cpu'"),
+        ({"passes": ("dpeth",)}, "Unknown pass 'dpeth'"),
+    ],
+)
+def test_unknown_choices_are_named(options, message):
+    with pytest.raises(InputError, match=message):
+        render(**options)
+
+
+@pytest.fixture
+def no_opengl(monkeypatch):
+    def fail():
+        raise DeviceError("OpenGL 3.3 is not available here")
+
+    monkeypatch.setattr(registry.gpu(), "shared_context", fail)
+    method = registry._import("gpu_shaders.methods.depth_peeling", "method")
+    monkeypatch.setattr(method, "create", fail)
+
+
+def test_without_opengl_the_cpu_does_the_work(no_opengl):
+    assert render(backend="auto").info.backend == "cpu"
+
+
+def test_without_opengl_the_gpu_says_why_not(no_opengl):
+    with pytest.raises(DeviceError, match="not available here"):
+        render(backend="gpu")
+    problems = {status.name: status.problem for status in meniscus.methods()}
+    assert "not available" in problems["depth_peeling"]
+    assert not problems["exact_intervals"]
+
+
+def test_too_many_balls_for_a_method(monkeypatch):
+    from meniscus.addon.render.method import MethodInfo
+
+    info = MethodInfo("small", "Small", "", "cpu", max_balls=1)
+    monkeypatch.setattr(renderer, "_pick_method", lambda *_: (info, registry.create_method("exact_intervals")[1]))
+    with pytest.raises(InputError, match="2 balls meet the view but Small takes at most 1"):
+        render()
+
+
+def test_unknown_pass_of_an_image_is_named():
+    with pytest.raises(InputError, match="no pass 'normal', only depth"):
+        render(passes=("depth",))["normal"]
