@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from fluid_scenes import (
     add_emitter,
+    add_geometry_nodes,
     add_particle_system,
     assert_same_points,
     input_error,
@@ -88,12 +89,25 @@ def test_positions_are_in_world_space_whatever_the_emitters_transform(meniscus, 
 def test_several_systems_are_read_together_and_hair_is_not(meniscus, empty_scene):
     item = add_emitter(empty_scene.collection)
     add_particle_system(item, count=20, particle_size=0.4)
-    add_particle_system(item, count=30, type="HAIR")
+    add_particle_system(item, count=30, type="HAIR").show_viewport = False
     play(empty_scene, 3)
     balls = read_balls(meniscus)
     assert len(balls) == 70
     assert np.count_nonzero(np.isclose(balls.radii, 0.4)) == 20
     assert balls.ids is None
+
+
+def test_emitter_whose_nodes_make_points_is_read_once(meniscus, empty_scene):
+    item = add_emitter(empty_scene.collection)
+    add_geometry_nodes(item, "GeometryNodeMeshToPoints")
+    play(empty_scene, 2)
+    assert len(read_balls(meniscus)) == 50
+
+
+def test_object_with_hair_only_is_read_as_points(meniscus, empty_scene):
+    item = add_emitter(empty_scene.collection, type="HAIR")
+    item.meniscus.radius_mode = "FIXED"
+    assert len(read_balls(meniscus)) == 4
 
 
 def test_fluid_physics_is_read(meniscus, empty_scene):
