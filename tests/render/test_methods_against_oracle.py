@@ -13,8 +13,12 @@ from meniscus.addon.render.registry import method_infos
 METHODS = [info.name for info in method_infos()]
 
 
+LARGE_SCENES = ("eye_inside_fluid", "long_lists", "random_5000", "lattice_with_droplets")
+SCENE_NAMES = [pytest.param(name, marks=[pytest.mark.slow] if name in LARGE_SCENES else []) for name in SCENES]
+
+
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("scene_name", SCENE_NAMES)
 @pytest.mark.parametrize("method", METHODS)
 def test_surface_matches_oracle(method, scene_name, projection):
     scene = SCENES[scene_name]()
@@ -24,6 +28,7 @@ def test_surface_matches_oracle(method, scene_name, projection):
     judge(image, scene, camera)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene_name", ["ten_balls", "coincident_balls", "lattice_with_droplets", "eye_inside_fluid"])
 def test_depth_peeling_is_exact_where_lists_overflow(scene_name, depth_peeling_with_list_of):
     scene = SCENES[scene_name]()
