@@ -73,3 +73,13 @@ def test_balls_without_a_surface_give_an_empty_image(method):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=32, height=24)
     balls = meniscus.Balls([[0, 0, 0], [0.1, 0, 0]], 1.0, weights=[0.05, -1])
     assert not meniscus.render(balls, camera, meniscus.Field(), method=method).hit.any()
+
+
+@pytest.mark.slow
+def test_ten_million_balls():
+    positions = np.random.default_rng(9).random((10_000_000, 3), dtype=np.float32) - 0.5
+    camera = meniscus.Camera.perspective((0, -3, 0), (0, 0, 0), fov_y=0.5, width=32, height=24)
+    image = meniscus.render(meniscus.Balls(positions, 0.004), camera, meniscus.Field(), method="exact_intervals")
+    assert image.info.counts["balls_drawn"] == 10_000_000
+    # The balls fill a unit cube so densely that its front face is closed.
+    assert np.all(np.abs(image["depth"][10:14, 14:18] - 2.5) < 0.05)
