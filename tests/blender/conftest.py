@@ -1,5 +1,6 @@
 """The extension, registered, under a bpy wheel as well as inside a real Blender."""
 
+import ctypes
 import importlib
 from collections.abc import Iterator
 from types import ModuleType
@@ -13,6 +14,13 @@ EXTENSION = "bl_ext.user_default.meniscus"
 def runs_inside_program() -> bool:
     """Whether this is the real Blender, where the installed and enabled zip is tested, or the Python module."""
     return bool(bpy.app.binary_path)
+
+
+@pytest.fixture(autouse=True)
+def blender_output() -> Iterator[None]:
+    """Empty C's own output buffer, through which Blender prints, while pytest still captures: it belongs to this test."""
+    yield
+    ctypes.CDLL(None).fflush(None)
 
 
 @pytest.fixture(scope="session")
