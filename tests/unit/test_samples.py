@@ -202,7 +202,7 @@ def test_a_bake_of_many_particles_is_the_same_in_every_process():
     )
 
     def positions_hash():
-        run = subprocess.run([sys.executable, "-c", bake], capture_output=True, text=True, check=True)
+        run = subprocess.run([sys.executable, "-c", bake], capture_output=True, text=True, check=True, timeout=300)
         return [line for line in run.stdout.splitlines() if line.startswith("positions")]
 
     first = positions_hash()
