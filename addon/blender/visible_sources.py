@@ -15,8 +15,8 @@ from ..fluid.errors import InputError
 def settings_of(owner: bpy.types.ID, depsgraph: bpy.types.Depsgraph) -> bpy.types.PropertyGroup:
     """The ``meniscus`` properties of an object or a scene that `depsgraph` evaluated, at its current frame.
 
-    Evaluated data would miss what was changed since Blender last copied it, and to ask for a copy starts simulations anew.
-    The originals get their animated values from the viewport's evaluation, but not from a render's.
+    In the viewport the original ones: evaluated ones miss what was changed since Blender last copied them, and to ask for a
+    copy starts unbaked simulations anew. In a render the evaluated ones: they are new, and safe from changes meanwhile.
     """
     return owner.meniscus if depsgraph.mode == "RENDER" else owner.original.meniscus
 
