@@ -16,6 +16,10 @@ _ALIVE = 3
 """Value of ``Particle.alive_state`` between birth and death."""
 
 
+_FLUID_SECOND = 2.5
+"""Fluid domains keep velocities in lengths of their longest side a unit of time, of which there are 0.1 in 1/25 second."""
+
+
 def has_particle_systems(item: bpy.types.Object) -> bool:
     """Whether an object has a particle system that is not hair."""
     return any(system.settings.type != "HAIR" for system in item.particle_systems)
@@ -40,17 +44,17 @@ def read_particles(source: Source, depsgraph: bpy.types.Depsgraph, viewport: boo
     """
     if not source.is_object_itself:
         return []
-    _check_settings(source.object)
+    _check_settings(source)
     systems = _shown_systems(source.object, depsgraph, viewport)
     return [_read_system(source, system, depsgraph) for system in systems]
 
 
-def _check_settings(item: bpy.types.Object) -> None:
-    settings = item.meniscus
+def _check_settings(source: Source) -> None:
+    settings = source.settings
     for what, mode in (("radius", settings.radius_mode), ("color", settings.color_mode)):
         if mode == "ATTRIBUTE":
             raise InputError(
-                f"The particle systems of '{item.name}' have no attributes: "
+                f"The particle systems of '{source.object.name}' have no attributes: "
                 f"choose another {what} in its Meniscus panel, or set its source to Points"
             )
 
@@ -72,12 +76,12 @@ def _shown_systems(
 
 
 def _read_system(source: Source, system: bpy.types.ParticleSystem, depsgraph: bpy.types.Depsgraph) -> BallPart:
-    settings, move = source.object.meniscus, source.world_from_original
+    settings, move = source.settings, source.world_from_original
     particles = system.particles
     shown = _shown_particles(system, depsgraph)
     positions = _picked(_vectors(particles, "location"), shown)
     velocities = _picked(_vectors(particles, "velocity"), shown)
-    velocities *= np.float32(_seconds_per_second(system.settings, depsgraph.scene_eval.render))
+    velocities *= np.float32(_velocity_scale(source.object, system.settings, depsgraph.scene_eval.render))
     if settings.radius_mode == "FIXED":
         radii = np.full(len(positions), settings.radius, np.float32)
     else:
@@ -93,9 +97,19 @@ def _read_system(source: Source, system: bpy.types.ParticleSystem, depsgraph: bp
     )
 
 
-def _seconds_per_second(settings: bpy.types.ParticleSettings, render: bpy.types.RenderSettings) -> float:
-    """Seconds of the simulation in a second of the film: Blender simulates `timestep` (0.04 s) a frame at any frame rate."""
+def _velocity_scale(item: bpy.types.Object, settings: bpy.types.ParticleSettings, render: bpy.types.RenderSettings) -> float:
+    """Factor from a system's own velocities to Blender units a second."""
+    domain = next((found.domain_settings for found in item.modifiers if found.type == "FLUID" and found.domain_settings), None)
+    if settings.type != "EMITTER" and domain is not None:
+        return _FLUID_SECOND * domain.time_scale * _longest_side(item, domain)
+    # Blender simulates `timestep` (0.04 seconds) in a frame, at any frame rate.
     return settings.timestep * render.fps / render.fps_base
+
+
+def _longest_side(item: bpy.types.Object, domain: bpy.types.FluidDomainSettings) -> float:
+    """Of a fluid domain, Blender units in world space."""
+    scale = np.linalg.norm(np.array(item.matrix_world)[:3, :3], axis=0)
+    return float(np.max(np.array(domain.cell_size) * np.array(domain.domain_resolution) * scale))
 
 
 def _shown_particles(system: bpy.types.ParticleSystem, depsgraph: bpy.types.Depsgraph) -> npt.NDArray[np.bool_]:

@@ -50,14 +50,14 @@ def _read_geometry(source: Source, data: bpy.types.Mesh | bpy.types.PointCloud) 
     positions = _attribute(data, "position", _VECTOR_TYPES)
     if positions is None or len(positions) == 0:
         return []
-    item, move = source.object, source.world_from_object
+    move = source.world_from_object
     velocities = _attribute(data, "velocity", _VECTOR_TYPES)
     return [
         BallPart(
             positions=transformed_points(positions, move),
-            radii=_radii(item, data, len(positions)) * mean_scale(move),
-            weight=item.meniscus.weight,
-            colors=_colors(item, data),
+            radii=_radii(source, data, len(positions)) * mean_scale(move),
+            weight=source.settings.weight,
+            colors=_colors(source, data),
             velocities=None if velocities is None else transformed_vectors(velocities, move),
             ids=_attribute(data, "id", _INTEGER_TYPES),
         )
@@ -73,21 +73,21 @@ def _check_can_have_points(source: Source) -> None:
         )
 
 
-def _radii(item: bpy.types.Object, data: bpy.types.ID, count: int) -> FloatArray:
-    settings = item.meniscus
+def _radii(source: Source, data: bpy.types.ID, count: int) -> FloatArray:
+    settings = source.settings
     if settings.radius_mode == "FIXED":
         return np.full(count, settings.radius, np.float32)
     if settings.radius_mode == "ATTRIBUTE":
-        return _required(item, data, settings.radius_attribute, _NUMBER_TYPES, "number").astype(np.float32)
-    return _required(item, data, "radius", _NUMBER_TYPES, "number") * np.float32(settings.radius_factor)
+        return _required(source.object, data, settings.radius_attribute, _NUMBER_TYPES, "number").astype(np.float32)
+    return _required(source.object, data, "radius", _NUMBER_TYPES, "number") * np.float32(settings.radius_factor)
 
 
-def _colors(item: bpy.types.Object, data: bpy.types.ID) -> FloatArray | None:
-    settings = item.meniscus
+def _colors(source: Source, data: bpy.types.ID) -> FloatArray | None:
+    settings = source.settings
     if settings.color_mode == "FIXED":
         return np.array(settings.color, np.float32)
     if settings.color_mode == "ATTRIBUTE":
-        return _required(item, data, settings.color_attribute, _COLOR_TYPES, "colour")[:, :3]
+        return _required(source.object, data, settings.color_attribute, _COLOR_TYPES, "colour")[:, :3]
     return None
 
 

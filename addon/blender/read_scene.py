@@ -16,7 +16,7 @@ from ..fluid.look import Look
 from .ball_part import BallPart
 from .read_particles import has_particle_systems, read_particles
 from .read_points import read_points
-from .visible_sources import Source, visible_sources
+from .visible_sources import Source, settings_of, visible_sources
 
 
 def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Balls:
@@ -43,7 +43,7 @@ def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Bal
     parts: list[BallPart] = []
     for source in visible_sources(depsgraph, viewport):
         parts.extend(_parts_of(source, depsgraph, viewport))
-    return _joined([part for part in parts if len(part)], read_look(depsgraph.scene_eval).color)
+    return _joined([part for part in parts if len(part)], tuple(settings_of(depsgraph.scene_eval, depsgraph).color))
 
 
 def read_field(scene: bpy.types.Scene) -> Field:
@@ -57,7 +57,7 @@ def read_look(scene: bpy.types.Scene) -> Look:
 
 
 def _parts_of(source: Source, depsgraph: bpy.types.Depsgraph, viewport: bool) -> list[BallPart]:
-    choice = source.object.meniscus.source
+    choice = source.settings.source
     if choice == "PARTICLES" and not has_particle_systems(source.object):
         raise InputError(f"'{source.object.name}' has no particle system: add one, or set its fluid source to Points")
     if choice == "PARTICLES" or (choice == "AUTO" and has_particle_systems(source.object)):

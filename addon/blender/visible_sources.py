@@ -12,6 +12,15 @@ import numpy.typing as npt
 from ..fluid.errors import InputError
 
 
+def settings_of(owner: bpy.types.ID, depsgraph: bpy.types.Depsgraph) -> bpy.types.PropertyGroup:
+    """The ``meniscus`` properties of an object or a scene that `depsgraph` evaluated, at its current frame.
+
+    In the viewport the original ones: evaluated ones miss what was changed since Blender last copied them, and to ask for a
+    copy starts unbaked simulations anew. In a render the evaluated ones: they are new, and safe from changes meanwhile.
+    """
+    return owner.meniscus if depsgraph.mode == "RENDER" else owner.original.meniscus
+
+
 @dataclass(frozen=True)
 class Source:
     """A fluid object at one place in the scene. Valid only until the next one is taken.
@@ -19,7 +28,9 @@ class Source:
     Attributes
     ----------
     object
-        The evaluated object that carries the settings.
+        The evaluated object.
+    settings
+        How it supplies balls, its ``meniscus`` properties.
     data
         Its geometry, or the further geometry that its modifiers make; None for objects without data.
     world_from_object
@@ -27,6 +38,7 @@ class Source:
     """
 
     object: bpy.types.Object
+    settings: bpy.types.PropertyGroup
     data: bpy.types.ID | None
     world_from_object: npt.NDArray[np.float64]
 
@@ -65,7 +77,8 @@ def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[
     InputError
         No object is used as fluid, or a render shows one that the viewport's dependency graph does not hold.
     """
-    fluid = {item.as_pointer() for item in depsgraph.ids if isinstance(item, bpy.types.Object) and item.meniscus.use_fluid}
+    evaluated = (item for item in depsgraph.ids if isinstance(item, bpy.types.Object))
+    fluid = {item.as_pointer() for item in evaluated if settings_of(item, depsgraph).use_fluid}
     if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
         raise InputError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
     is_shown = _shown_in_viewport(depsgraph) if viewport else _shown_in_render(depsgraph)
@@ -90,27 +103,28 @@ def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
 def _places(depsgraph: bpy.types.Depsgraph, fluid: set[int]) -> Iterator[tuple[Source, bpy.types.Object]]:
     """Each place of the objects in `fluid` (addresses), with the object of the view layer that puts it there."""
     # Walking instances is slow where particles are drawn as many objects, so it is done only where fluid may be among them.
-    if not any(_may_instance_fluid(item) for item in depsgraph.objects):
+    if not any(_may_instance_fluid(item, depsgraph) for item in depsgraph.objects):
         for item in depsgraph.objects:
             if item.as_pointer() in fluid:
-                yield Source(item, item.data, np.array(item.matrix_world, np.float64)), item
+                yield Source(item, settings_of(item, depsgraph), item.data, np.array(item.matrix_world, np.float64)), item
         return
     for instance in depsgraph.object_instances:
         item = instance.instance_object if instance.is_instance else instance.object
         if item.as_pointer() in fluid:
             place = np.array(instance.matrix_world, np.float64)
-            yield Source(item, instance.object.data, place), instance.parent if instance.is_instance else item
+            source = Source(item, settings_of(item, depsgraph), instance.object.data, place)
+            yield source, instance.parent if instance.is_instance else item
 
 
-def _may_instance_fluid(item: bpy.types.Object) -> bool:
+def _may_instance_fluid(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     if item.instance_type != "NONE" or any(modifier.type == "NODES" for modifier in item.modifiers):
         return True
     instanced = (found for system in item.particle_systems for found in _instanced_objects(system.settings))
-    return any(_may_be_fluid(found) for found in instanced)
+    return any(_may_be_fluid(found, depsgraph) for found in instanced)
 
 
-def _may_be_fluid(item: bpy.types.Object) -> bool:
-    return item.meniscus.use_fluid or item.instance_type != "NONE" or len(item.modifiers) > 0
+def _may_be_fluid(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    return settings_of(item, depsgraph).use_fluid or item.instance_type != "NONE" or len(item.modifiers) > 0
 
 
 def _instanced_objects(settings: bpy.types.ParticleSettings) -> list[bpy.types.Object]:

@@ -4,7 +4,7 @@ import importlib
 
 import bpy
 import pytest
-from fluid_scenes import add_points
+from fluid_scenes import add_points, read_balls
 
 
 def module(meniscus, name):
@@ -72,3 +72,19 @@ def test_every_property_has_a_description_without_full_stop(meniscus):
             for text in texts:
                 assert text.strip(), own.identifier
                 assert not text.endswith("."), own.identifier
+
+
+def test_settings_hold_at_once_for_what_was_evaluated_before(meniscus, empty_scene):
+    item = add_points(empty_scene.collection)
+    item.meniscus.color_mode = "LOOK"
+    painted = add_points(empty_scene.collection, "Painted")
+    painted.meniscus.color_mode = "FIXED"
+    assert len(read_balls(meniscus)) == 8
+    painted.meniscus.color = (0.0, 1.0, 0.0)
+    item.meniscus.radius_factor = painted.meniscus.radius_factor = 4.0
+    empty_scene.meniscus.color = (1.0, 0.0, 0.0)
+    balls = read_balls(meniscus)
+    assert sorted(map(tuple, balls.colors.tolist())) == [(0.0, 1.0, 0.0)] * 4 + [(1.0, 0.0, 0.0)] * 4
+    assert set(balls.radii.tolist()) == {2.0}
+    painted.meniscus.use_fluid = False
+    assert len(read_balls(meniscus)) == 4

@@ -101,10 +101,13 @@ def test_instances_follow_the_visibility_of_their_instancer(meniscus, collection
     assert counts(meniscus) == (0, 4)
 
 
-def test_render_reads_what_is_hidden_in_the_viewport(meniscus, collection):
+def test_render_reads_what_is_hidden_in_the_viewport_and_animated_settings(meniscus, collection, tmp_path):
     """With a render's own dependency graph, which is how a render engine reads."""
     hidden = add_points(collection, "Hidden")
     hidden.hide_viewport = True
+    for frame, factor in ((1, 1.0), (5, 3.0)):
+        hidden.meniscus.radius_factor = factor
+        hidden.keyframe_insert("meniscus.radius_factor", frame=frame)
     add_points(collection, "Viewport only").hide_render = True
     camera = add_object(collection, "Camera", bpy.data.cameras.new("Camera"))
     scene = bpy.context.scene
@@ -112,18 +115,20 @@ def test_render_reads_what_is_hidden_in_the_viewport(meniscus, collection):
     read_scene = importlib.import_module(meniscus.__name__ + ".addon.blender.read_scene")
     found = []
 
-    class CountingEngine(bpy.types.RenderEngine):
-        bl_idname = "COUNTING"
-        bl_label = "Counting"
+    class ReadingEngine(bpy.types.RenderEngine):
+        bl_idname = "READING"
+        bl_label = "Reading"
 
         def render(self, depsgraph):
-            found.append(len(read_scene.read_balls(depsgraph)))
+            found.extend(read_scene.read_balls(depsgraph).radii.tolist())
 
-    bpy.utils.register_class(CountingEngine)
+    bpy.utils.register_class(ReadingEngine)
     try:
-        scene.render.engine = "COUNTING"
+        scene.render.engine = "READING"
+        scene.frame_start = scene.frame_end = 5
         scene.render.resolution_x = scene.render.resolution_y = 8
-        bpy.ops.render.render()
+        scene.render.filepath = str(tmp_path / "####")
+        bpy.ops.render.render(animation=True)
     finally:
-        bpy.utils.unregister_class(CountingEngine)
-    assert found == [4]
+        bpy.utils.unregister_class(ReadingEngine)
+    assert found == [1.5] * 4
