@@ -1,10 +1,11 @@
-"""Runs tests/blender in every Blender there is: the bpy wheels, Debian's real programs and the machine's own.
+"""Runs the tests in every Blender there is: the bpy wheels, Debian's real programs and the machine's own.
 
     python3 tools/hosts.py --list                      name the hosts
     python3 tools/hosts.py HOST [PYTEST_ARGUMENT ...]  set one up if need be, and test in it
 
-The real programs run tests/gui as well, in a window under Xvfb. The machine's own Blender is the host `blender-own`; BLENDER=/path/to/blender says where it is. In the real programs the
-built zip is installed and enabled first, and the tests run at the next start.
+All run tests/blender without a window; the real programs also run tests/gui, in a window under Xvfb, and in them the built
+zip is installed and enabled first and tested at the next start. The machine's own Blender is the host `blender-own`;
+BLENDER=/path/to/blender says where it is.
 """
 
 from __future__ import annotations
