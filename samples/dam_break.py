@@ -78,15 +78,19 @@ def baked_file(*, seed: int = 1, spacing: float = 0.06, frame_end: int = 60) -> 
 def _add_tank(scene: bpy.types.Scene) -> None:
     """Invisible solid walls that overlap at the edges, so that no particle slips out; a visible floor, back and pillar."""
     length, depth, height = TANK
-    outer_low, outer_high = (-WALL, -WALL, -WALL), (length + WALL, depth + WALL, 2 * height)
-    for axis in range(3):
-        for is_high in (False, True) if axis < 2 else (False,):
-            low, high = list(outer_low), list(outer_high)
-            low[axis], high[axis] = (TANK[axis], outer_high[axis]) if is_high else (outer_low[axis], 0.0)
-            wall = scene_parts.add_box(scene, "Wall", tuple(low), tuple(high))
-            wall.display_type = "BOUNDS"
-            wall.hide_render = True
-            add_collision(wall, damping=0.0, friction=0.0)
+    west, south, floor, east, north, top = -WALL, -WALL, -WALL, length + WALL, depth + WALL, 2 * height
+    walls = (
+        ((west, south, floor), (east, north, 0.0)),
+        ((west, south, floor), (0.0, north, top)),
+        ((length, south, floor), (east, north, top)),
+        ((west, south, floor), (east, 0.0, top)),
+        ((west, depth, floor), (east, north, top)),
+    )
+    for low, high in walls:
+        wall = scene_parts.add_box(scene, "Wall", low, high)
+        wall.display_type = "BOUNDS"
+        wall.hide_render = True
+        add_collision(wall, damping=0.0, friction=0.0)
     tank = scene_parts.add_box(scene, "Tank", (0.0, 0.0, 0.0), TANK, without=("front", "top"))
     scene_parts.add_surface(tank, (0.7, 0.7, 0.7))
     pillar = scene_parts.add_box(scene, "Pillar", PILLAR_LOW, PILLAR_HIGH)
