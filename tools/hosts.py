@@ -27,7 +27,6 @@ from project import CACHE, REQUIREMENTS, ROOT, ToolError, command_line, fingerpr
 OWN = "blender-own"
 SUITE = "tests/blender"
 WINDOW_SUITE = "tests/gui"
-IN_WINDOW = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x800x24")
 # What the tests need beside the installed extension.
 STAGED = ("tests", "samples", "pyproject.toml")
 PYTEST_OPTIONS = ["-p", "no:cacheprovider"]
@@ -129,14 +128,20 @@ def stage_for(name: str) -> Iterator[Stage]:
         with tempfile.TemporaryDirectory(prefix="meniscus-") as folder:
             settings = ["env", f"BLENDER_USER_RESOURCES={folder}/settings"]
             blender = os.environ["BLENDER"]
-            yield Stage(Path(folder), folder, [*settings, blender], [*settings, *IN_WINDOW, blender])
+            yield Stage(Path(folder), folder, [*settings, blender], [*settings, *under_xvfb(folder), blender])
         return
     system = debian_blender.PROGRAMS[name].folder
     with tempfile.TemporaryDirectory(prefix="meniscus-", dir=system / "tmp") as folder:
         inside = f"/tmp/{Path(folder).name}"
         settings = ["env", f"BLENDER_USER_RESOURCES={inside}/settings"]
-        commands = ([*settings, "blender"], [*settings, *IN_WINDOW, "blender"])
+        commands = ([*settings, "blender"], [*settings, *under_xvfb(inside), "blender"])
         yield Stage(Path(folder), inside, *(debian_blender.command_inside(system, command) for command in commands))
+
+
+def under_xvfb(folder: str) -> list[str]:
+    """What starts a program with a screen that nobody sees; its pixels are in a file, whose path is in MENISCUS_SCREEN."""
+    screen = f"--server-args=-screen 0 1280x800x24 -fbdir {folder}/screen"
+    return [f"MENISCUS_SCREEN={folder}/screen/Xvfb_screen0", "xvfb-run", "--auto-servernum", screen]
 
 
 def fill(folder: Path) -> None:
@@ -150,6 +155,7 @@ def fill(folder: Path) -> None:
     shutil.copytree(ensure_pytest_site(), folder / "site")
     shutil.copy(built_zip(), folder / "extension.zip")
     (folder / "settings").mkdir()
+    (folder / "screen").mkdir()
 
 
 def built_zip() -> Path:
