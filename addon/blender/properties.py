@@ -38,6 +38,11 @@ def stable_items(items: Iterable[Item]) -> list[NumberedItem]:
     return [(name, label, description, zlib.crc32(name.encode()) & 0x7FFFFFFF) for name, label, description in items]
 
 
+def _tag_owner(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    """Have the owner evaluated again: Blender does so by itself where the interface sets a value, not where a script does."""
+    settings.id_data.update_tag()
+
+
 class MENISCUS_PG_object(bpy.types.PropertyGroup):
     """How an object supplies balls."""
 
@@ -45,6 +50,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         name="Use as Fluid",
         description="Draw the particles or points of this object as a blended surface",
         default=False,
+        update=_tag_owner,
     )
     source: EnumProperty(
         name="Source",
@@ -55,6 +61,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("POINTS", "Points", "Mesh vertices and point clouds, also those that Geometry Nodes make", 2),
         ),
         default="AUTO",
+        update=_tag_owner,
     )
     radius_mode: EnumProperty(
         name="Radius",
@@ -65,6 +72,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("FIXED", "Fixed", "The same radius for all", 2),
         ),
         default="PARTICLE",
+        update=_tag_owner,
     )
     radius_factor: FloatProperty(
         name="Factor",
@@ -73,11 +81,13 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_min=0.5,
         soft_max=8.0,
+        update=_tag_owner,
     )
     radius_attribute: StringProperty(
         name="Attribute",
         description="Name of the attribute on points that holds the influence radius, in the object's space",
         default="radius",
+        update=_tag_owner,
     )
     radius: FloatProperty(
         name="Radius",
@@ -87,6 +97,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         soft_min=0.001,
         subtype="DISTANCE",
         unit="LENGTH",
+        update=_tag_owner,
     )
     weight: FloatProperty(
         name="Weight",
@@ -94,6 +105,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         default=1.0,
         soft_min=-2.0,
         soft_max=2.0,
+        update=_tag_owner,
     )
     color_mode: EnumProperty(
         name="Color",
@@ -104,6 +116,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("ATTRIBUTE", "Attribute", "A colour on each point", 2),
         ),
         default="LOOK",
+        update=_tag_owner,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -113,11 +126,13 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
+        update=_tag_owner,
     )
     color_attribute: StringProperty(
         name="Attribute",
         description="Name of the colour attribute on points",
         default="Color",
+        update=_tag_owner,
     )
 
 
@@ -129,6 +144,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         description="How the density of a ball falls from its centre to its influence radius",
         items=stable_items((kernel.name, kernel.label, kernel.description) for kernel in KERNELS.values()),
         default=Field().kernel,
+        update=_tag_owner,
     )
     isovalue: FloatProperty(
         name="Isovalue",
@@ -138,18 +154,21 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_min=0.01,
         soft_max=1.0,
         precision=3,
+        update=_tag_owner,
     )
     method: EnumProperty(
         name="Method",
         description="How the surface is found",
         items=stable_items(method_items()),
         default="auto",
+        update=_tag_owner,
     )
     backend: EnumProperty(
         name="Device",
         description="What computes the image",
         items=stable_items(BACKENDS),
         default="auto",
+        update=_tag_owner,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -159,6 +178,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
+        update=_tag_owner,
     )
     ambient: FloatProperty(
         name="Ambient",
@@ -167,6 +187,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
+        update=_tag_owner,
     )
 
 

@@ -72,3 +72,16 @@ def test_every_property_has_a_description_without_full_stop(meniscus):
             for text in texts:
                 assert text.strip(), own.identifier
                 assert not text.endswith("."), own.identifier
+
+
+def test_values_that_a_script_sets_are_read_at_once(meniscus, empty_scene):
+    read_balls = importlib.import_module(f"{meniscus.__name__}.addon.blender.read_scene").read_balls
+    mesh = bpy.data.meshes.new("points")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0)], [], [])
+    item = bpy.data.objects.new("points", mesh)
+    empty_scene.collection.objects.link(item)
+    item.meniscus.use_fluid = True
+    item.meniscus.radius_mode = "FIXED"
+    for radius in (0.5, 0.25):
+        item.meniscus.radius = radius
+        assert read_balls(bpy.context.evaluated_depsgraph_get()).radii.tolist() == [radius, radius]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import meniscus
 from judge import compare
-from meniscus.addon.render.registry import method_infos
 from scenes import SCENES
+
+import meniscus
+from meniscus.addon.render.registry import method_infos
 
 
 def main() -> None:
