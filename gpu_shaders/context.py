@@ -7,7 +7,7 @@ in the interface as well as with --background. All OpenGL work goes through :met
 from __future__ import annotations
 
 import ctypes
-import sys
+import platform
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -47,7 +47,7 @@ class GpuContext:
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
         self._programs: dict[tuple[str, str, tuple[tuple[str, object], ...]], moderngl.Program] = {}
-        self.run(self._open)
+        self._thread.submit(self._open).result()
 
     def _open(self) -> None:
         try:
@@ -55,8 +55,11 @@ class GpuContext:
             self.gl = moderngl.create_context(require=330, standalone=True, context=self._glcontext)
         # glcontext and moderngl raise bare Exception for whatever the driver lacks.
         except Exception as error:
-            raise DeviceError(f"OpenGL 3.3 is not available here ({error}); use the CPU back-end or install a driver") from error
-        self.gl.gc_mode = "auto"
+            raise DeviceError(
+                f"OpenGL 3.3 is not available here ({error}); use the CPU back-end or install a driver"
+            ) from error
+        # Python may collect an object on any thread; OpenGL frees it on its own, when asked.
+        self.gl.gc_mode = "context_gc"
         self.renderer = self.gl.info["GL_RENDERER"]
         self.version = self.gl.version_code
         self._bind_texture = self._function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
@@ -64,12 +67,24 @@ class GpuContext:
 
     def _function(self, name: str, *arguments: type) -> Callable[..., None]:
         """An OpenGL function that moderngl does not offer."""
-        kind = ctypes.WINFUNCTYPE if sys.platform == "win32" else ctypes.CFUNCTYPE
-        return kind(None, *arguments)(self._glcontext.load(name))
+        # On 64-bit systems, the only ones that Blender runs on, there is one calling convention.
+        return ctypes.CFUNCTYPE(None, *arguments)(self._glcontext.load(name))
 
     def run(self, work: Callable[[], Result]) -> Result:
-        """Do `work` on the context's thread and wait for it."""
-        return self._thread.submit(work).result()
+        """Do `work` on the context's thread and wait for it; DeviceError where the driver reports an error."""
+        return self._thread.submit(self._checked, work).result()
+
+    def _checked(self, work: Callable[[], Result]) -> Result:
+        try:
+            result = work()
+        except moderngl.Error as error:
+            raise DeviceError(f"The graphics driver failed ({error}); use the CPU back-end") from error
+        finally:
+            self.gl.gc()
+        error_name = self.gl.error
+        if error_name != "GL_NO_ERROR":
+            raise DeviceError(f"The graphics driver reports {error_name}; render a smaller image or use the CPU back-end")
+        return result
 
     @property
     def is_software(self) -> bool:
@@ -108,7 +123,7 @@ class GpuContext:
 
 def _standalone_glcontext() -> Any:
     """glcontext's way to a standalone context: without a display on Linux."""
-    if sys.platform.startswith("linux"):
+    if platform.system() == "Linux":
         # The names of the libraries as drivers install them; those without a number belong to developer packages.
         egl = glcontext.get_backend_by_name("egl")
         return egl(mode="standalone", libgl="libGL.so.1", libegl="libEGL.so.1", glversion=330)

@@ -131,12 +131,16 @@ def command_inside(folder: Path, command: Sequence[str]) -> list[str]:
 
 def remove_system(folder: Path) -> None:
     """Delete a system, never through a mount."""
-    mounts = [line.split()[1] for line in Path("/proc/self/mounts").read_text().splitlines()]
-    live = [mount for mount in mounts if mount.startswith(f"{folder}/")]
+    live = mounts_below(folder)
     if live:
         raise ToolError(f"Something is mounted below {folder}; unmount it first: {' '.join(live)}")
     if folder.exists():
         shutil.rmtree(folder)
+
+
+def mounts_below(folder: Path) -> list[str]:
+    mounts = [line.split()[1] for line in Path("/proc/self/mounts").read_text().splitlines()]
+    return [mount for mount in mounts if mount.startswith(f"{folder}/")]
 
 
 def main(arguments: list[str]) -> int:

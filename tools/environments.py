@@ -72,7 +72,12 @@ def make(environment: Environment, python: str, lock: Path) -> None:
     """Make the environment anew. The stamp that tells it is whole is written afterwards, by the caller."""
     ensure_libraries()
     uv = ensure_uv()
-    run([uv, "venv", "--quiet", "--clear", "--python", python, environment.folder], env=uv_variables())
+    try:
+        run([uv, "venv", "--quiet", "--clear", "--python", python, environment.folder], env=uv_variables())
+    except ToolError as error:
+        raise ToolError(
+            f"Python {python} could not be used or fetched: install it (Debian's package, pyenv) and try again."
+        ) from error
     install: list[str | Path] = [uv, "pip", "install", "--quiet", "--require-hashes", "--no-deps", "--only-binary", ":all:"]
     run([*install, "-r", lock, "--python", environment.python], env=uv_variables())
     if environment.package:

@@ -96,7 +96,8 @@ class Balls:
         if not self.dropped:
             return ""
         reasons = ", ".join(f"{count} whose {reason}" for reason, count in self.dropped.items())
-        return f"{sum(self.dropped.values())} balls were left out: {reasons}"
+        total = sum(self.dropped.values())
+        return f"{total} {'ball was' if total == 1 else 'balls were'} left out: {reasons}"
 
 
 def _numeric(name: str, values: npt.ArrayLike, dtype: type) -> npt.NDArray[Any]:
@@ -138,5 +139,5 @@ def _usable(columns: dict[str, Any]) -> tuple[npt.NDArray[np.bool_] | None, dict
 
 
 def _finite(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    finite = np.isfinite(values)
+    finite: npt.NDArray[np.bool_] = np.isfinite(values)
     return finite if finite.ndim == 1 else finite[:, 0] & finite[:, 1] & finite[:, 2]

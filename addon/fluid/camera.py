@@ -129,7 +129,7 @@ class Camera:
         clip_start: float = 0.1,
         clip_end: float = 1000.0,
     ) -> Camera:
-        """An orthographic camera at `eye` that looks towards `target` (world space); `scale` is the view's height, Blender units."""
+        """An orthographic camera at `eye` that looks towards `target` (world space); `scale` is the view's height."""
         if not 0 < scale < math.inf:
             raise InputError(f"The orthographic scale must be greater than 0, not {scale}")
         return cls(_look_at(eye, target, up), _centred_window(scale, width, height), False, width, height, clip_start, clip_end)
@@ -142,7 +142,7 @@ class Camera:
     @property
     def view_from_world(self) -> FloatArray:
         """(4, 4), the inverse of `world_from_view`."""
-        return np.linalg.inv(self.world_from_view)
+        return np.linalg.inv(self.world_from_view).astype(np.float64, copy=False)
 
     @property
     def pixel_size(self) -> tuple[float, float]:
@@ -219,5 +219,10 @@ def _look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike) -> Fl
         raise InputError("The camera needs an eye that differs from its target, and an up direction across its view")
     backward, right = backward / lengths[0], right / lengths[1]
     transform = np.eye(4)
-    transform[:3, 0], transform[:3, 1], transform[:3, 2], transform[:3, 3] = right, np.cross(backward, right), backward, eye_point
+    transform[:3, 0], transform[:3, 1], transform[:3, 2], transform[:3, 3] = (
+        right,
+        np.cross(backward, right),
+        backward,
+        eye_point,
+    )
     return transform

@@ -56,7 +56,9 @@ class Field:
         (N,) float64, world units; 0 where a ball alone has no surface. ``r0 = R sqrt(1 - x0)`` with
         ``q f(x0) = T`` (Kanamori et al. 2008, section 5.2).
         """
-        weights = np.asarray(weights, np.float64)
-        ratio = np.divide(self.isovalue, weights, out=np.full_like(weights, np.inf), where=weights > 0)
+        # Millions of balls have a handful of weights.
+        values, which = np.unique(np.asarray(weights, np.float64), return_inverse=True)
+        ratio = np.divide(self.isovalue, values, out=np.full_like(values, np.inf), where=values > 0)
         x0 = self.density_kernel.inverse(ratio)
-        return np.where(np.isnan(x0), 0.0, np.asarray(radii, np.float64) * np.sqrt(np.maximum(1 - x0, 0)))
+        shares = np.where(np.isnan(x0), 0.0, np.sqrt(np.maximum(1 - x0, 0)))
+        return np.asarray(radii, np.float64) * shares[which]

@@ -37,7 +37,7 @@ class Kernel:
     def value(self, x: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         """``f(x)`` for ``x`` of any shape; zero where ``x <= 0``."""
         inside = np.maximum(x, 0)
-        result = np.zeros_like(inside)
+        result: npt.NDArray[np.floating] = np.zeros_like(inside)
         for coefficient in reversed(self.coefficients):
             result = result * inside + coefficient
         return result

@@ -17,5 +17,5 @@ class Look:
         Share of the light that does not depend on the angle, 0 to 1.
     """
 
-    color: tuple[float, float, float] = (0.25, 0.5, 0.8)
+    color: tuple[float, float, float] = (0.06, 0.27, 0.6)
     ambient: float = 0.1

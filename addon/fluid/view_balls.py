@@ -43,7 +43,8 @@ class ViewBalls:
 def view_balls(balls: Balls, camera: Camera, field: Field) -> ViewBalls:
     """Move the balls into view space and keep those whose influence sphere meets the view between its clip distances."""
     rotation = camera.world_from_view[:3, :3]
-    centers = (balls.positions - camera.eye) @ rotation
+    # Coordinates in rows: products of (3, 3) with (3, N) are fast, those of (N, 3) with (3, 3) are not.
+    centers = (rotation.T @ (balls.positions.T - camera.eye[:, None])).T
     radii = balls.radii.astype(np.float64)
     seen = _meets_view(centers, radii, camera)
     weights = balls.weights[seen].astype(np.float64)

@@ -67,4 +67,5 @@ def _candidates(rays: Rays, spheres: Spheres) -> tuple[npt.NDArray[np.intp], npt
     squares = np.einsum("ij,ij->i", origins, origins)[:, None] + np.einsum("ij,ij->i", centers, centers)
     distance_2 = squares - 2 * origins @ centers.T
     # The products cancel; widen by more than their rounding.
-    return np.nonzero(distance_2 - along**2 <= spheres.radii**2 + 1e-12 * (squares + along**2))
+    ray, ball = np.nonzero(distance_2 - along**2 <= spheres.radii**2 + 1e-12 * (squares + along**2))
+    return ray, ball

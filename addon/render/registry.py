@@ -94,6 +94,11 @@ def gpu() -> ModuleType:
         raise DeviceError(f"OpenGL cannot be used because a package is missing ({error}); reinstall the extension") from error
 
 
+def runs_in_software_opengl(info: MethodInfo) -> bool:
+    """Whether the method would run through an OpenGL that is itself only software; DeviceError where there is none."""
+    return info.backend == "gpu" and bool(gpu().shared_context().is_software)
+
+
 def _problem(info: MethodInfo) -> str:
     if info.backend == "cpu":
         return ""

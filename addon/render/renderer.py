@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +19,10 @@ from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from ..fluid.view_balls import ViewBalls, view_balls
 from .method import Method, MethodInfo, Surface
-from .registry import create_method, gpu, method_infos
+from .registry import create_method, method_infos, runs_in_software_opengl
 from .shading import headlight
+
+Element = TypeVar("Element", np.float32, np.bool_)
 
 BACKENDS = ("auto", "gpu", "cpu")
 
@@ -73,7 +76,10 @@ def render(
 
 
 def _pick_method(method: str, backend: str) -> tuple[MethodInfo, Method]:
-    """The method asked for, or the preferred one that runs here on the back-end asked for."""
+    """The method asked for, or the preferred one that runs here on the back-end asked for.
+
+    Left to choose, OpenGL is taken where it is hardware: in software it is slower than the CPU back-end.
+    """
     if backend not in BACKENDS:
         raise InputError(f"Unknown back-end '{backend}': choose one of {', '.join(BACKENDS)}")
     if method != "auto":
@@ -85,6 +91,8 @@ def _pick_method(method: str, backend: str) -> tuple[MethodInfo, Method]:
     for info in method_infos():
         if backend in ("auto", info.backend):
             try:
+                if backend == "auto" and runs_in_software_opengl(info):
+                    continue
                 return create_method(info.name)
             except DeviceError as error:
                 problems.append(str(error))
@@ -145,7 +153,7 @@ def _world_directions(camera: Camera) -> npt.NDArray[np.float64]:
     return directions @ camera.world_from_view[:3, :3].T
 
 
-def _in_whole_image(image: npt.NDArray, camera: Camera, background: float) -> npt.NDArray:
+def _in_whole_image(image: npt.NDArray[Element], camera: Camera, background: float) -> npt.NDArray[Element]:
     if camera.region is None:
         return image
     region = camera.region

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import meniscus
 import pytest
+
+import meniscus
 
 
 @pytest.fixture(scope="session", autouse=True)

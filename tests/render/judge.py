@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import meniscus
 import numpy as np
+
+import meniscus
 from meniscus.addon.fluid.kernels import KERNELS
 
 # A ray whose density has an extremum this close to the isovalue cannot be decided in single precision.
@@ -72,30 +73,66 @@ def is_undecidable(balls, field, want: Expected, index: int, camera: meniscus.Ca
     return False
 
 
-def judge(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> None:
-    """Assert the bounds that every exact method keeps: hits, distances, normals."""
-    balls, field = scene.balls, scene.field
-    want = expected(balls, field, camera)
-    hit = image.hit.ravel()
+@dataclass
+class Verdict:
+    """How an image compares with the oracle.
+
+    Attributes
+    ----------
+    compared
+        Pixels that hit in both.
+    wrong
+        A line for each pixel that is wrong, and decidable.
+    undecidable
+        How many pixels differ where nothing can be decided.
+    worst, rms
+        |dt| / R, R of the ball that dominates at the hit.
+    worst_angle
+        Between normals, degrees.
+    """
+
+    compared: int
+    wrong: list[str]
+    undecidable: int
+    worst: float
+    rms: float
+    worst_angle: float
+
+
+def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> Verdict:
+    """Compare every pixel of an image with the oracle."""
+    want = expected(scene.balls, scene.field, camera)
+    hit, should_hit = image.hit.ravel(), np.isfinite(want.t)
     t = np.where(hit, image["depth"].ravel() * want.stretch, np.inf)
-    should_hit = np.isfinite(want.t)
     both = hit & should_hit
     error = np.zeros(len(t))
     error[both] = np.abs(t[both] - want.t[both]) / want.radius[both]
-
     suspects = np.flatnonzero((hit != should_hit) | (error > 1e-3))
-    undecidable = [index for index in suspects if is_undecidable(balls, field, want, index, camera, t[index])]
+    undecidable = [index for index in suspects if is_undecidable(scene.balls, scene.field, want, index, camera, t[index])]
     wrong = [
-        f"pixel {divmod(int(index), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, R = {want.radius[index]:.3g}"
+        f"{divmod(int(index), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, R = {want.radius[index]:.2g}"
         for index in suspects
         if index not in undecidable
     ]
-    assert not wrong, f"{len(wrong)} wrong pixels of {both.sum()}: {wrong[:5]}"
-    assert len(undecidable) <= 0.002 * len(t), f"{len(undecidable)} pixels cannot be decided; the scene is no use"
+    both[undecidable] = False
+    cross = np.cross(image["normal"].reshape(-1, 3)[both].astype(np.float64), want.normals[both])
+    dot = np.einsum("ij,ij->i", image["normal"].reshape(-1, 3)[both].astype(np.float64), want.normals[both])
+    angle = np.degrees(np.arctan2(np.linalg.norm(cross, axis=1), dot))
+    return Verdict(
+        compared=int(both.sum()),
+        wrong=wrong,
+        undecidable=len(undecidable),
+        worst=float(error[both].max(initial=0.0)),
+        rms=float(np.sqrt(np.mean(error[both] ** 2))) if both.any() else 0.0,
+        worst_angle=float(angle.max(initial=0.0)),
+    )
 
-    sure = both.copy()
-    sure[undecidable] = False
-    assert np.sqrt(np.mean(error[sure] ** 2)) <= 1e-4
-    cosine = np.einsum("ij,ij->i", image["normal"].reshape(-1, 3)[sure].astype(np.float64), want.normals[sure])
-    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    assert angle.max(initial=0.0) <= 0.5
+
+def judge(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> None:
+    """Assert the bounds that every exact method keeps: hits, distances, normals."""
+    verdict = compare(image, scene, camera)
+    assert not verdict.wrong, f"{len(verdict.wrong)} wrong pixels of {verdict.compared}: {verdict.wrong[:5]}"
+    assert verdict.undecidable <= 0.002 * camera.width * camera.height, "too many pixels cannot be decided"
+    assert verdict.worst <= 1e-3
+    assert verdict.rms <= 1e-4
+    assert verdict.worst_angle <= 0.5

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import meniscus
 import numpy as np
+
+import meniscus
 
 WIDTH, HEIGHT = 96, 72
 
@@ -103,7 +104,9 @@ def far_from_origin() -> Scene:
 def radii_over_six_orders() -> Scene:
     """Pairs of balls from a thousandth to a thousand units, each as large in the view as the others."""
     radii = 10.0 ** np.arange(-3, 4)
-    across = np.array([[x, 0, z] for x, z in ((-1.1, 0), (-0.6, 0.8), (-0.2, -0.6), (0.2, 0.7), (0.5, -0.4), (0.9, 0.6), (1.3, -0.7))])
+    across = np.array(
+        [[x, 0, z] for x, z in ((-1.1, 0), (-0.6, 0.8), (-0.2, -0.6), (0.2, 0.7), (0.5, -0.4), (0.9, 0.6), (1.3, -0.7))]
+    )
     first = radii[:, None] * (across * 1.6 + [0, 7, 0])
     second = first + radii[:, None] * [0.5, 0.2, 0.3]
     balls = meniscus.Balls(np.concatenate([first, second]), np.tile(radii, 2))

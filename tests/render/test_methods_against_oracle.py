@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import meniscus
 import numpy as np
 import pytest
 from judge import judge
-from meniscus.addon.render.registry import method_infos
 from scenes import SCENES
+
+import meniscus
+from meniscus.addon.render.registry import method_infos
 
 METHODS = [info.name for info in method_infos()]
 
 
+LARGE_SCENES = ("eye_inside_fluid", "long_lists", "random_5000", "lattice_with_droplets")
+SCENE_NAMES = [pytest.param(name, marks=[pytest.mark.slow] if name in LARGE_SCENES else []) for name in SCENES]
+
+
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-@pytest.mark.parametrize("scene_name", SCENES)
+@pytest.mark.parametrize("scene_name", SCENE_NAMES)
 @pytest.mark.parametrize("method", METHODS)
 def test_surface_matches_oracle(method, scene_name, projection):
     scene = SCENES[scene_name]()
@@ -23,6 +28,7 @@ def test_surface_matches_oracle(method, scene_name, projection):
     judge(image, scene, camera)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene_name", ["ten_balls", "coincident_balls", "lattice_with_droplets", "eye_inside_fluid"])
 def test_depth_peeling_is_exact_where_lists_overflow(scene_name, depth_peeling_with_list_of):
     scene = SCENES[scene_name]()
@@ -58,7 +64,8 @@ def test_no_balls_give_an_empty_image(method):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=8, height=6)
     image = meniscus.render(meniscus.Balls(np.zeros((0, 3)), 1.0), camera, meniscus.Field(), method=method)
     assert not image.hit.any()
-    assert np.all(image["depth"] == np.float32(1e10)) and np.all(image["normal"] == 0)
+    assert np.all(image["depth"] == np.float32(1e10))
+    assert np.all(image["normal"] == 0)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -66,3 +73,13 @@ def test_balls_without_a_surface_give_an_empty_image(method):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=32, height=24)
     balls = meniscus.Balls([[0, 0, 0], [0.1, 0, 0]], 1.0, weights=[0.05, -1])
     assert not meniscus.render(balls, camera, meniscus.Field(), method=method).hit.any()
+
+
+@pytest.mark.slow
+def test_ten_million_balls():
+    positions = np.random.default_rng(9).random((10_000_000, 3), dtype=np.float32) - 0.5
+    camera = meniscus.Camera.perspective((0, -3, 0), (0, 0, 0), fov_y=0.5, width=32, height=24)
+    image = meniscus.render(meniscus.Balls(positions, 0.004), camera, meniscus.Field(), method="exact_intervals")
+    assert image.info.counts["balls_drawn"] == 10_000_000
+    # The balls fill a unit cube so densely that its front face is closed.
+    assert np.all(np.abs(image["depth"][10:14, 14:18] - 2.5) < 0.05)

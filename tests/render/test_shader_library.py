@@ -5,6 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
+
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.render.exact_intervals import bernstein
@@ -43,7 +44,7 @@ def test_bezier_clipping_finds_the_first_root(opengl, kernel):
     values = ", ".join(f"in_{index}" for index in range(degree + 1))
     body = f"float p[KERNEL_DEGREE + 1] = float[KERNEL_DEGREE + 1]({values}); result = bezier_first_root(p);"
     roots = run_on_rows(opengl, "lib/bezier_clipping.glsl", constants, body, polynomials)
-    expected = bernstein.first_root(polynomials.astype(np.float64))
+    expected = bernstein.first_root(polynomials.T.astype(np.float64))
     found = roots <= 1
     assert np.count_nonzero(found != np.isfinite(expected)) == 0
     np.testing.assert_allclose(roots[found], expected[found], atol=2e-6)
@@ -66,8 +67,8 @@ def test_interval_polynomial_is_the_kernel_along_the_ray(opengl, kernel):
         )
         coefficient = run_on_rows(opengl, "lib/kernel.glsl", constants, body, rows)
         at_begin, at_end = (begin - middle) / radius, (end - middle) / radius
-        x = np.stack([peak - at_begin**2, peak - at_begin * at_end, peak - at_end**2], 1)
-        np.testing.assert_allclose(coefficient, 1.5 * bernstein.compose(KERNELS[kernel], x)[:, index], atol=1e-5)
+        x = np.stack([peak - at_begin**2, peak - at_begin * at_end, peak - at_end**2])
+        np.testing.assert_allclose(coefficient, 1.5 * bernstein.compose(KERNELS[kernel], x)[index], atol=1e-5)
 
 
 @pytest.mark.parametrize("kernel", KERNELS)

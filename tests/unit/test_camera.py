@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import meniscus
 import numpy as np
 import pytest
+
+import meniscus
 from meniscus.addon.fluid.camera import Region, Window
 from meniscus.addon.fluid.errors import InputError
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import meniscus
 import numpy as np
 import pytest
+
+import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.fluid.passes import checked_passes
@@ -36,7 +37,8 @@ def test_kernel_derivative_is_the_slope_of_its_value(name):
 @pytest.mark.parametrize("name", KERNELS)
 def test_kernel_is_zero_outside_the_influence_sphere(name):
     outside = np.array([-2.0, -1e-9, 0.0])
-    assert np.all(KERNELS[name].value(outside) == 0) and np.all(KERNELS[name].derivative(outside) == 0)
+    assert np.all(KERNELS[name].value(outside) == 0)
+    assert np.all(KERNELS[name].derivative(outside) == 0)
 
 
 @pytest.mark.parametrize("name", KERNELS)
@@ -55,8 +57,10 @@ def test_kernel_radius_is_where_a_lone_ball_has_the_isovalue():
 
 def test_balls_repeat_single_values():
     balls = meniscus.Balls(np.zeros((3, 3)), 0.5, colors=(1, 0, 0))
-    assert balls.radii.tolist() == [0.5] * 3 and balls.weights.tolist() == [1] * 3
-    assert balls.colors.shape == (3, 3) and balls.velocities is None
+    assert balls.radii.tolist() == [0.5] * 3
+    assert balls.weights.tolist() == [1] * 3
+    assert balls.colors.shape == (3, 3)
+    assert balls.velocities is None
     assert all(array.dtype == np.float32 and array.flags.c_contiguous for array in (balls.positions, balls.radii, balls.colors))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.gpu_shaders import glsl
 
@@ -19,7 +20,9 @@ def shader_folder(tmp_path, monkeypatch):
 
 
 def test_includes_nest_and_come_once(shader_folder):
-    shader_folder(a='#include "b.glsl"\n#include "c.glsl"\nvoid a() {}\n', b='#include "c.glsl"\nvoid b() {}\n', c="void c() {}\n")
+    shader_folder(
+        a='#include "b.glsl"\n#include "c.glsl"\nvoid a() {}\n', b='#include "c.glsl"\nvoid b() {}\n', c="void c() {}\n"
+    )
     source = glsl.Source("a.glsl", {"SIZE": 3})
     code = [line for line in source.text.splitlines() if not line.startswith("#line")]
     assert code == ["#version 330 core", "#define SIZE 3", "void c() {}", "void b() {}", "void a() {}"]
@@ -41,5 +44,5 @@ def test_compiler_logs_name_the_files(shader_folder):
 
 
 def test_missing_shader_file_is_named(shader_folder):
-    with pytest.raises(DeviceError, match="'nowhere.glsl' cannot be read"):
+    with pytest.raises(DeviceError, match=r"'nowhere\.glsl' cannot be read"):
         glsl.Source("nowhere.glsl", {})

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import meniscus
+from math import comb
+
 import numpy as np
 import pytest
+
+import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.render.exact_intervals import bernstein
@@ -36,7 +39,8 @@ def test_ray_past_the_kernel_sphere_misses():
     radius = np.sqrt(0.5)
     assert np.isfinite(cast_one(balls, field, (radius - 1e-9, -3, 0))[0])
     t, normal = cast_one(balls, field, (radius + 1e-9, -3, 0))
-    assert np.isinf(t) and not normal.any()
+    assert np.isinf(t)
+    assert not normal.any()
 
 
 def test_two_equal_balls_along_the_ray():
@@ -114,35 +118,46 @@ def test_oracle_rejects_unusable_rays():
         meniscus.oracle.cast(balls, field, np.zeros((1, 3)), np.zeros((1, 3)))
 
 
+def value(p, u):
+    """The definition: the sum of the coefficients times the Bernstein polynomials."""
+    degree = len(p) - 1
+    return sum(comb(degree, k) * u**k * (1 - u) ** (degree - k) * p[k] for k in range(degree + 1))
+
+
 def test_bernstein_product_and_composition():
     generator = np.random.default_rng(5)
-    p, q, u = generator.normal(size=(20, 4)), generator.normal(size=(20, 3)), generator.random(20)
-    np.testing.assert_allclose(bernstein.value(bernstein.product(p, q), u), bernstein.value(p, u) * bernstein.value(q, u))
-    composed = bernstein.compose(KERNELS["wyvill"], q)
-    x = bernstein.value(q, u)
-    np.testing.assert_allclose(bernstein.value(composed, u), (5 * x**2 + 4 * x**3) / 9)
+    p, q, u = generator.normal(size=(4, 20)), generator.normal(size=(3, 20)), generator.random(20)
+    np.testing.assert_allclose(value(bernstein.product(p, q), u), value(p, u) * value(q, u))
+    x = value(q, u)
+    np.testing.assert_allclose(value(bernstein.compose(KERNELS["wyvill"], q), u), (5 * x**2 + 4 * x**3) / 9)
 
 
 def test_bernstein_restriction():
     generator = np.random.default_rng(6)
-    p, u = generator.normal(size=(50, 7)), generator.random(50)
+    p, u = generator.normal(size=(7, 50)), generator.random(50)
     low, high = np.sort(generator.random((2, 50)), axis=0)
-    np.testing.assert_allclose(bernstein.value(bernstein.restrict(p, low, high), u), bernstein.value(p, low + u * (high - low)))
+    np.testing.assert_allclose(value(bernstein.restrict(p, low, high), u), value(p, low + u * (high - low)))
+
+
+def test_bernstein_value_and_slope():
+    generator = np.random.default_rng(7)
+    p, u = generator.normal(size=(7, 50)), generator.uniform(0.1, 0.9, 50)
+    height, slope = bernstein.value_and_slope(p, u)
+    np.testing.assert_allclose(height, value(p, u))
+    np.testing.assert_allclose(slope, (value(p, u + 1e-6) - value(p, u - 1e-6)) / 2e-6, atol=1e-7)
 
 
 def test_first_root_is_the_first_of_several():
     # (u - 0.2)(u - 0.5)(u - 0.9) rises through zero at 0.2.
-    roots = np.array([[0.2, 0.5, 0.9]])
-    u = np.linspace(0, 1, 4)
-    samples = np.prod(u[:, None] - roots, axis=1)
-    basis = np.stack([bernstein.value(np.eye(4)[[k]].repeat(4, 0), u) for k in range(4)], 1)
-    p = np.linalg.solve(basis, samples)[None]
+    p = np.ones((1, 1))
+    for root in (0.2, 0.5, 0.9):
+        p = bernstein.product(p, np.array([[-root], [1 - root]]))
     np.testing.assert_allclose(bernstein.first_root(p), 0.2, atol=1e-13)
     np.testing.assert_allclose(bernstein.first_root(-p), 0.0)
 
 
 def test_first_root_finds_a_double_root_and_passes_a_near_miss():
     # (u - 0.3)^2 in Bernstein form is 0.09, -0.21, 0.49.
-    touching = -np.array([[0.09, -0.21, 0.49]])
+    touching = -np.array([[0.09], [-0.21], [0.49]])
     assert bernstein.first_root(touching)[0] == pytest.approx(0.3, abs=1e-6)
     assert np.isnan(bernstein.first_root(touching - 1e-9)[0])

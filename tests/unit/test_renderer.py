@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
-import meniscus
 import numpy as np
 import pytest
+
+import meniscus
 from meniscus.addon.fluid.camera import Region
 from meniscus.addon.fluid.errors import CancelledError, DeviceError, InputError
 from meniscus.addon.render import registry, renderer
@@ -39,7 +41,8 @@ def test_row_zero_is_at_the_bottom():
     low = meniscus.Balls([[0, 0, -0.6]], 0.5)
     camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=8, height=8)
     hit = render(camera, low).hit
-    assert hit[:4].any() and not hit[4:].any()
+    assert hit[:4].any()
+    assert not hit[4:].any()
 
 
 def test_position_lies_on_the_ray_at_the_depth():
@@ -59,7 +62,8 @@ def test_headlight_is_brightest_where_the_surface_faces_the_eye():
     row = render(camera, meniscus.Balls([[0, 0, 0]], 0.9), look=look)["combined"][10]
     np.testing.assert_allclose(row[10, :3], (0.5, 0.25, 1.0), atol=1e-4)
     lit = row[row[:, 3] > 0][:, 0]
-    assert np.all(np.diff(lit[: len(lit) // 2 + 1]) > 0) and lit[0] > 0.2 * 0.5
+    assert np.all(np.diff(lit[: len(lit) // 2 + 1]) > 0)
+    assert lit[0] > 0.2 * 0.5
 
 
 def test_region_is_the_same_part_of_the_whole_image():
@@ -75,8 +79,10 @@ def test_region_is_the_same_part_of_the_whole_image():
 def test_info_says_what_happened():
     balls = meniscus.Balls([[0, 0, 0], [np.nan, 0, 0], [500, 0, 0]], 0.5)
     info = render(balls=balls).info
-    assert (info.method, info.backend) == ("exact_intervals", "cpu") and "CPU" in info.device
-    assert info.counts["balls"] == 2 and info.counts["balls_drawn"] == 1
+    assert (info.method, info.backend) == ("exact_intervals", "cpu")
+    assert "CPU" in info.device
+    assert info.counts["balls"] == 2
+    assert info.counts["balls_drawn"] == 1
     assert info.dropped == {"position is not finite": 1}
     assert list(info.milliseconds) == ["view", "surface", "passes"]
 
@@ -110,6 +116,15 @@ def no_opengl(monkeypatch):
     monkeypatch.setattr(method, "create", fail)
 
 
+@pytest.mark.parametrize(("is_software", "expected"), [(True, "exact_intervals"), (False, "depth_peeling")])
+def test_software_opengl_is_left_alone_unless_asked_for(monkeypatch, is_software, expected):
+    stand_in = SimpleNamespace(is_software=is_software)
+    monkeypatch.setattr(registry.gpu(), "shared_context", lambda: stand_in)
+    monkeypatch.setattr(renderer, "create_method", lambda name: (name, None))
+    assert renderer._pick_method("auto", "auto")[0] == expected
+    assert renderer._pick_method("auto", "gpu")[0] == "depth_peeling"
+
+
 def test_without_opengl_the_cpu_does_the_work(no_opengl):
     assert render(backend="auto").info.backend == "cpu"
 
@@ -118,7 +133,8 @@ def test_without_opengl_the_gpu_says_why_not(no_opengl):
     with pytest.raises(DeviceError, match="not available here"):
         render(backend="gpu")
     problems = {status.name: status.problem for status in meniscus.methods()}
-    assert "not available" in problems["depth_peeling"] and not problems["exact_intervals"]
+    assert "not available" in problems["depth_peeling"]
+    assert not problems["exact_intervals"]
 
 
 def test_too_many_balls_for_a_method(monkeypatch):

@@ -107,10 +107,10 @@ def _crossings(spheres: Spheres, pairs: Pairs, inside: npt.NDArray[np.bool_], fi
     """The first crossing in each interval: its ray and its distance, infinite where there is none; (I,) each."""
     interval_ray, begin, end, member_of, member = _intervals(pairs)
     densities = _densities(pairs.where(member), spheres, begin[member_of], end[member_of], field)
-    totals = np.stack([_sums(member_of, column, len(begin)) for column in densities.T], axis=1)
+    totals = np.stack([_sums(member_of, coefficient, len(begin)) for coefficient in densities])
     # Seen from outside the density rises to the isovalue, seen from inside it falls to it.
     sign = np.where(inside[interval_ray], -1.0, 1.0)
-    root = bernstein.first_root(sign[:, None] * (totals - field.isovalue))
+    root = bernstein.first_root(sign * (totals - field.isovalue))
     # Between crossings that coincide only some of their balls are counted: there is no interval.
     missed = np.isnan(root) | (end <= begin)
     return interval_ray, np.where(missed, np.inf, begin + root * (end - begin))
@@ -175,31 +175,37 @@ def _intervals(pairs: Pairs) -> tuple[IntArray, FloatArray, FloatArray, IntArray
 
 
 def _densities(members: Pairs, spheres: Spheres, begin: FloatArray, end: FloatArray, field: Field) -> FloatArray:
-    """Bernstein form of ``q f(x)`` of each member over its interval, (C, degree + 1)."""
+    """Bernstein form of ``q f(x)`` of each member over its interval, (degree + 1, C)."""
     radius = spheres.radii[members.ball]
     at_begin, at_end = (begin - members.middle) / radius, (end - members.middle) / radius
-    x = np.stack([members.peak - at_begin**2, members.peak - at_begin * at_end, members.peak - at_end**2], axis=1)
-    return spheres.weights[members.ball][:, None] * bernstein.compose(field.density_kernel, x)
+    x = np.stack([members.peak - at_begin**2, members.peak - at_begin * at_end, members.peak - at_end**2])
+    return spheres.weights[members.ball] * bernstein.compose(field.density_kernel, x)
+
+
+def _reach(pairs: Pairs, t: FloatArray) -> npt.NDArray[np.bool_]:
+    """(P,): whether the pair's ball reaches its ray's point at `t`."""
+    at = t[pairs.ray]
+    return (pairs.entry <= at) & (at <= pairs.exit)
 
 
 def normals(rays: Rays, spheres: Spheres, pairs: Pairs, t: FloatArray, field: Field) -> FloatArray:
     """(count, 3): unit, against the gradient of the field at `t`; 0 where `t` is infinite."""
-    hit = np.isfinite(t)
-    pairs = pairs.where(hit[pairs.ray])
-    from_center = rays.points(np.where(hit, t, 0))[pairs.ray] - spheres.centers[pairs.ball]
+    pairs = pairs.where(_reach(pairs, t))
+    from_center = rays.points(np.where(np.isfinite(t), t, 0))[pairs.ray] - spheres.centers[pairs.ball]
     radius = spheres.radii[pairs.ball]
     x = 1 - np.einsum("ij,ij->i", from_center, from_center) / radius**2
     pull = spheres.weights[pairs.ball] * field.density_kernel.derivative(x) / radius**2
     outward = np.stack([_sums(pairs.ray, pull * axis, len(rays)) for axis in from_center.T], axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
-    return np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    unit: FloatArray = np.divide(outward, length, out=np.zeros_like(outward), where=length > 0)
+    return unit
 
 
 def blended_colors(
     rays: Rays, spheres: Spheres, pairs: Pairs, t: FloatArray, field: Field, colors: npt.NDArray[np.floating]
 ) -> FloatArray:
     """(count, 3): the balls' colours weighted by their share of the density at `t`; 0 where `t` is infinite."""
-    pairs = pairs.where(np.isfinite(t)[pairs.ray])
+    pairs = pairs.where(_reach(pairs, t))
     share = np.maximum(_shares(spheres, pairs, t, field), 0)
     total = _sums(pairs.ray, share, len(rays))
     summed = np.stack([_sums(pairs.ray, share * channel[pairs.ball], len(rays)) for channel in colors.T], axis=1)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from ...fluid.camera import Camera
+from ...fluid.camera import Camera, Region
 from ...fluid.field import Field
 from ...fluid.view_balls import ViewBalls
 from ..method import Surface
@@ -32,7 +33,8 @@ class ExactIntervals:
         """See :meth:`method.Method.find_surface`."""
         depth = np.full((camera.height, camera.width), np.inf, np.float32)
         normal = np.zeros((camera.height, camera.width, 3), np.float32)
-        color = np.zeros_like(normal) if wants_color and balls.colors is not None else None
+        colors = balls.colors if wants_color else None
+        color = None if colors is None else np.zeros_like(normal)
         spheres = Spheres(balls.centers, balls.radii, balls.weights, balls.kernel_radii)
         covered = pixel_bounds(balls, camera)
         pair_count = 0
@@ -45,8 +47,8 @@ class ExactIntervals:
             depth[begin:end] = (t / stretch).reshape(rows)
             in_view = normals(rays, spheres, pairs, t, field)
             normal[begin:end] = (in_view @ camera.world_from_view[:3, :3].T).reshape(*rows, 3)
-            if color is not None:
-                color[begin:end] = blended_colors(rays, spheres, pairs, t, field, balls.colors).reshape(*rows, 3)
+            if color is not None and colors is not None:
+                color[begin:end] = blended_colors(rays, spheres, pairs, t, field, colors).reshape(*rows, 3)
             pair_count += len(pairs.ray)
         return Surface(depth, normal, color, {"ray_ball_pairs": pair_count})
 
@@ -74,7 +76,9 @@ def pixel_bounds(balls: ViewBalls, camera: Camera) -> IntArray:
     return bounds
 
 
-def _extent(coordinate: FloatArray, depth: FloatArray, radius: FloatArray, is_perspective: bool) -> tuple[FloatArray, FloatArray]:
+def _extent(
+    coordinate: FloatArray, depth: FloatArray, radius: FloatArray, is_perspective: bool
+) -> tuple[FloatArray, FloatArray]:
     """Where spheres begin and end along one axis, in units of the camera's window."""
     if not is_perspective:
         return coordinate - radius, coordinate + radius
@@ -116,7 +120,8 @@ def _candidates(covered: IntArray, image_width: int, begin: int, end: int) -> tu
 
 def _rays(camera: Camera, begin: int, end: int) -> tuple[Rays, FloatArray]:
     """The view-space rays of the rows [begin, end), and their length for each unit of planar depth."""
-    origins, directions = (array[begin:end].reshape(-1, 3) for array in camera.view_rays())
+    band = replace(camera, region=Region(0, begin, camera.width, end))
+    origins, directions = (array.reshape(-1, 3) for array in band.view_rays())
     stretch: npt.NDArray[np.float64] = np.linalg.norm(directions, axis=1)
     rays = Rays(origins, directions / stretch[:, None], camera.clip_start * stretch, camera.clip_end * stretch)
     return rays, stretch

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ....addon.fluid.camera import Camera, Region
-from ....addon.fluid.errors import DeviceError
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import Kernel
 from ....addon.fluid.view_balls import ViewBalls
@@ -48,7 +47,7 @@ class DepthPeeling:
     @property
     def device(self) -> str:
         """What the driver calls the graphics processor."""
-        return self._context.renderer
+        return str(self._context.renderer)
 
     def find_surface(
         self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
@@ -69,33 +68,28 @@ class DepthPeeling:
     ) -> None:
         """Fill `surface` band by band; on the context's thread."""
         textures = _ball_textures(self._context.gl, balls)
-        constants = {"BALL_TEXTURE_WIDTH": _BALL_TEXTURE_WIDTH, "LIST_LENGTH": self._list_length}
-        constants.update(kernel_constants(field.density_kernel))
-        try:
-            for band in _bands(camera):
-                part = replace(camera, region=band).cropped()
-                frame = _Frame(self._context, self._targets_for(part), constants, len(balls), check_cancelled)
-                frame.bind(textures, _uniforms(balls, part, field))
-                counts = frame.peel_all()
-                normal_depth, color = frame.read()
-                rows = slice(band.y_min, band.y_max)
-                surface.normal[rows], surface.depth[rows] = normal_depth[..., :3], normal_depth[..., 3]
-                if surface.color is not None:
-                    surface.color[rows] = color[..., :3]
-                for name, count in counts.items():
-                    surface.counts[name] += count
-        except moderngl.Error as error:
-            raise DeviceError(f"The graphics driver failed while peeling ({error}); try the CPU back-end") from error
-        finally:
-            for texture in textures.values():
-                texture.release()
+        constants = {
+            "BALL_TEXTURE_WIDTH": _BALL_TEXTURE_WIDTH,
+            "LIST_LENGTH": self._list_length,
+            **kernel_constants(field.density_kernel),
+        }
+        for band in _bands(camera):
+            part = replace(camera, region=band).cropped()
+            frame = _Frame(self._context, self._targets_for(part), constants, len(balls), check_cancelled)
+            frame.bind(textures, _uniforms(balls, part, field))
+            counts = frame.peel_all()
+            normal_depth, color = frame.read()
+            rows = slice(band.y_min, band.y_max)
+            surface.normal[rows], surface.depth[rows] = normal_depth[..., :3], normal_depth[..., 3]
+            if surface.color is not None:
+                surface.color[rows] = color[..., :3]
+            for name, count in counts.items():
+                surface.counts[name] += count
 
     def _targets_for(self, camera: Camera) -> _Targets:
         """The render targets of the camera's size, kept from band to band and frame to frame."""
         size = (camera.width, camera.height)
         if self._targets is None or self._targets.size != size:
-            if self._targets:
-                self._targets.release()
             self._targets = _Targets(self._context, size)
         return self._targets
 
@@ -188,17 +182,8 @@ class _Targets:
         self.sum = gl.framebuffer(self.sums)
         self.gather = gl.framebuffer(self.sums[:2])
         self.finish = gl.framebuffer(self.outputs)
-        for texture in self._textures():
+        for texture in [self.crossing, *self.lists[0], *self.lists[1], *self.sums, *self.outputs]:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-
-    def _textures(self) -> list[moderngl.Texture]:
-        return [self.crossing, *self.depths, *self.lists[0], *self.lists[1], *self.sums, *self.outputs]
-
-    def release(self) -> None:
-        """Free the images."""
-        framebuffers = [*self.peel, *self.whole_list, *self.state_only, self.sum, self.gather, self.finish]
-        for item in [*framebuffers, *self._textures()]:
-            item.release()
 
 
 class _Frame:
