@@ -92,8 +92,9 @@ def test_settings_hold_at_once_for_what_was_evaluated_before(meniscus, empty_sce
 
 
 def test_changing_a_setting_leaves_an_unbaked_simulation_as_it_is(meniscus, empty_scene):
-    item = add_emitter(empty_scene.collection, physics_type="FLUID", count=300, frame_end=20)
-    play(empty_scene, 15)
+    item = add_emitter(empty_scene.collection, physics_type="FLUID", count=500, frame_end=30)
+    item.particle_systems[0].settings.effector_weights.gravity = 1
+    play(empty_scene, 20)
     before = read_balls(meniscus).positions
     item.meniscus.radius_factor = 3.0
     empty_scene.meniscus.isovalue = 0.5
