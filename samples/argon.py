@@ -55,7 +55,7 @@ def build(scene: bpy.types.Scene, *, count: int = 5000, seed: int = 1, frame: in
     atoms = balls(count, seed, frame)
     half_side = float(np.abs(atoms.positions).max(initial=SIGMA))
     scene_parts.set_frames(scene, 1)
-    scene_parts.add_camera(scene, (4.2 * half_side, -5.8 * half_side, 2.9 * half_side), (0.0, 0.0, 0.0))
+    scene_parts.add_camera(scene, (4.6 * half_side, -6.4 * half_side, 3.2 * half_side), (0.0, 0.0, 0.0))
     scene_parts.add_lights(scene)
     return scene_parts.add_balls(scene, "Argon", atoms)
 

@@ -64,7 +64,8 @@ def _droplets(count: int, inner: float, random: np.random.Generator) -> npt.NDAr
     half_side = np.cbrt(random.uniform(inner**3, outer**3, count))
     points = random.uniform(-1.0, 1.0, (count, 3))
     points[np.arange(count), random.integers(0, 3, count)] = random.choice([-1.0, 1.0], count)
-    return points * half_side[:, None]
+    points *= half_side[:, None]
+    return points
 
 
 if __name__ == "__main__":

@@ -75,9 +75,9 @@ def _add_jet(scene: bpy.types.Scene, spacing: float, seed: int, frame_end: int) 
     nozzle = scene_parts.add_turned(scene, "Liquid", [(0.0, NOZZLE_HEIGHT), (NOZZLE_RADIUS, NOZZLE_HEIGHT)])
     nozzle.show_instancer_for_render = False
     seconds = frame_end / scene.render.fps
-    count = round(math.pi * NOZZLE_RADIUS**2 * SPEED * seconds / spacing**3)
-    system = add_particle_system(nozzle, count=count, size=spacing / 2, lifetime=LIFETIME, seed=seed, frame_end=frame_end)
+    system = add_particle_system(nozzle, size=spacing / 2, lifetime=LIFETIME, seed=seed, frame_end=frame_end)
     settings = system.settings
+    settings.count = round(math.pi * NOZZLE_RADIUS**2 * SPEED * seconds / spacing**3)
     settings.frame_end = frame_end
     settings.emit_from = "FACE"
     settings.object_align_factor = (0.0, 0.0, SPEED)

@@ -155,7 +155,8 @@ def _flat_cells(cells_xyz: IndexArray, cells: int) -> IndexArray:
 
 
 def _nearest_image(separations: FloatArray, box: float) -> FloatArray:
-    return separations - box * np.rint(separations / box)
+    images: FloatArray = np.rint(separations / box)
+    return separations - box * images
 
 
 def _expanded_ranges(starts: IndexArray, ends: IndexArray) -> tuple[IndexArray, IndexArray]:

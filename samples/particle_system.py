@@ -16,14 +16,12 @@ MASS = 0.01
 
 
 def add_particle_system(
-    item: bpy.types.Object, *, count: int, size: float, lifetime: float, seed: int, frame_end: int
+    item: bpy.types.Object, *, size: float, lifetime: float, seed: int, frame_end: int
 ) -> bpy.types.ParticleSystem:
     """A particle system on `item` that emits at frame 1, with a cache for the frames 1 to `frame_end`.
 
     Parameters
     ----------
-    count
-        Of particles.
     size
         Radius of a particle, Blender units.
     lifetime
@@ -35,7 +33,6 @@ def add_particle_system(
     system.point_cache.frame_start, system.point_cache.frame_end = 1, frame_end
     settings = system.settings
     settings.frame_start = settings.frame_end = 1
-    settings.count = count
     settings.particle_size = size
     settings.lifetime = lifetime
     settings.normal_factor = 0.0

@@ -6,6 +6,7 @@ import argparse
 import inspect
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def _parser(build: Callable[..., Any]) -> argparse.ArgumentParser:
         kind = type(option.default)
         parser.add_argument(
             f"--{option.name.replace('_', '-')}",
-            type=lambda text, kind=kind: _positive(kind, text),
+            type=partial(_positive, kind),
             default=option.default,
             metavar="NUMBER",
             help=f"{option.default} if left out",

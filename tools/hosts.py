@@ -1,10 +1,11 @@
-"""Runs tests/blender in every Blender there is: the bpy wheels, Debian's real programs and the machine's own.
+"""Runs the tests in every Blender there is: the bpy wheels, Debian's real programs and the machine's own.
 
     python3 tools/hosts.py --list                      name the hosts
     python3 tools/hosts.py HOST [PYTEST_ARGUMENT ...]  set one up if need be, and test in it
 
-The machine's own Blender is the host `blender-own`; BLENDER=/path/to/blender says where it is. In the real programs the
-built zip is installed and enabled first, and the tests run at the next start.
+All run tests/blender without a window; the real programs also run tests/gui, in a window under Xvfb, and in them the built
+zip is installed and enabled first and tested at the next start. The machine's own Blender is the host `blender-own`;
+BLENDER=/path/to/blender says where it is.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from project import CACHE, REQUIREMENTS, ROOT, ToolError, command_line, fingerpr
 
 OWN = "blender-own"
 SUITE = "tests/blender"
+WINDOW_SUITE = "tests/gui"
+IN_WINDOW = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x800x24")
 # What the tests need beside the installed extension.
 STAGED = ("tests", "samples", "pyproject.toml")
 PYTEST_OPTIONS = ["-p", "no:cacheprovider"]
@@ -32,17 +35,26 @@ PYTEST_OPTIONS = ["-p", "no:cacheprovider"]
 
 @dataclass(frozen=True)
 class Stage:
-    """A folder that a Blender program can see: where it lies, what it is called there, and how the program is started."""
+    """A folder that a Blender program can see: where it lies, what it is called there, and how the program is started.
+
+    `window_command` starts it with a window that nobody needs to see.
+    """
 
     folder: Path
     path_inside: str
     command: list[str]
+    window_command: list[str]
 
 
 def names() -> list[str]:
     """Every host of this machine; its own Blender only where BLENDER names it."""
     own = [OWN] if os.environ.get("BLENDER") else []
     return [*bpy_names(), *debian_blender.PROGRAMS, *own]
+
+
+def window_names() -> list[str]:
+    """The hosts that can open a window."""
+    return [name for name in names() if name not in bpy_names()]
 
 
 def bpy_names() -> list[str]:
@@ -68,7 +80,15 @@ def run_suite(name: str, pytest_arguments: Sequence[str], report: Path | None = 
     if name in bpy_names():
         return run_in_bpy(name, pytest_arguments, report)
     with stage_for(name) as stage:
-        return run_in_program(stage, pytest_arguments, report)
+        install_extension(stage)
+        return run_in_program(stage, [*stage.command, "--background"], SUITE, pytest_arguments, report)
+
+
+def run_window_suite(name: str, pytest_arguments: Sequence[str], report: Path | None = None) -> int:
+    """Run tests/gui in a real program that is set up, with a window; its exit status."""
+    with stage_for(name) as stage:
+        install_extension(stage)
+        return run_in_program(stage, stage.window_command, WINDOW_SUITE, pytest_arguments, report)
 
 
 def run_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None) -> int:
@@ -79,16 +99,20 @@ def run_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None) 
         return subprocess.run(command, env=variables, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
 
 
-def run_in_program(stage: Stage, pytest_arguments: Sequence[str], report: Path | None) -> int:
-    """Install and enable the zip, then run the suite at the next start."""
+def install_extension(stage: Stage) -> None:
+    """Fill the stage, install the zip and enable it for the next start."""
     fill(stage.folder)
+    zip_inside = f"{stage.path_inside}/extension.zip"
+    run([*stage.command, "--command", "extension", "install-file", "-r", "user_default", "-e", zip_inside])
+
+
+def run_in_program(stage: Stage, program: list[str], tests: str, pytest_arguments: Sequence[str], report: Path | None) -> int:
+    """Run tests in a program in which the extension was enabled at an earlier start."""
     inside = stage.path_inside
-    run([*stage.command, "--command", "extension", "install-file", "-r", "user_default", "-e", f"{inside}/extension.zip"])
-    suite = [f"{inside}/{SUITE}", "--rootdir", inside, "-c", f"{inside}/pyproject.toml", *PYTEST_OPTIONS]
+    suite = [f"{inside}/{tests}", "--rootdir", inside, "-c", f"{inside}/pyproject.toml", *PYTEST_OPTIONS]
     suite += ["--junitxml", f"{inside}/report.xml", *pytest_arguments]
-    script = ["--python-exit-code", "1", "--python", f"{inside}/{SUITE}/run_in_blender.py", "--", f"{inside}/site", *suite]
-    command = [*stage.command, "--background", *script]
-    status = subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode
+    script = ["--python-exit-code", "1", "--python", f"{inside}/tests/run_in_blender.py", "--", f"{inside}/site", *suite]
+    status = subprocess.run([*program, *script], stdin=subprocess.DEVNULL, check=False).returncode
     if report and (stage.folder / "report.xml").is_file():
         shutil.copy(stage.folder / "report.xml", report)
     return status
@@ -104,13 +128,15 @@ def stage_for(name: str) -> Iterator[Stage]:
     if name == OWN:
         with tempfile.TemporaryDirectory(prefix="meniscus-") as folder:
             settings = ["env", f"BLENDER_USER_RESOURCES={folder}/settings"]
-            yield Stage(Path(folder), folder, [*settings, os.environ["BLENDER"]])
+            blender = os.environ["BLENDER"]
+            yield Stage(Path(folder), folder, [*settings, blender], [*settings, *IN_WINDOW, blender])
         return
     system = debian_blender.PROGRAMS[name].folder
     with tempfile.TemporaryDirectory(prefix="meniscus-", dir=system / "tmp") as folder:
         inside = f"/tmp/{Path(folder).name}"
-        blender = ["env", f"BLENDER_USER_RESOURCES={inside}/settings", "blender"]
-        yield Stage(Path(folder), inside, debian_blender.command_inside(system, blender))
+        settings = ["env", f"BLENDER_USER_RESOURCES={inside}/settings"]
+        commands = ([*settings, "blender"], [*settings, *IN_WINDOW, "blender"])
+        yield Stage(Path(folder), inside, *(debian_blender.command_inside(system, command) for command in commands))
 
 
 def fill(folder: Path) -> None:
@@ -164,7 +190,10 @@ def main(arguments: list[str]) -> int:
         raise ToolError(f"say which host: {', '.join(names())}")
     name, *pytest_arguments = arguments
     prepare(name)
-    return run_suite(name, pytest_arguments)
+    status = run_suite(name, pytest_arguments)
+    if name in window_names():
+        status = run_window_suite(name, pytest_arguments) or status
+    return status
 
 
 if __name__ == "__main__":

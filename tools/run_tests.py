@@ -13,7 +13,7 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,7 +46,9 @@ def run_all() -> list[Result]:
         ready = {name: background.submit(hosts.prepare, name) for name in hosts.names()}
         results = [check("lint", lint.lint), pytest_suite("unit"), pytest_suite("render")]
         results.append(check("extension", lambda: build_after(wheels)))
-        results += [host_suite(name, setup) for name, setup in ready.items()]
+        results += [host_suite(name, name, setup, hosts.run_suite) for name, setup in ready.items()]
+        windows = {name: ready[name] for name in hosts.window_names()}
+        results += [host_suite(f"{name}-window", name, setup, hosts.run_window_suite) for name, setup in windows.items()]
     return results
 
 
@@ -78,16 +80,16 @@ def pytest_suite(name: str, *options: str) -> Result:
     return result_of(name, status)
 
 
-def host_suite(name: str, setup: Future[None]) -> Result:
-    """Run tests/blender in a host, once it is set up."""
-    announce(f"tests/blender in {name}")
+def host_suite(name: str, host: str, setup: Future[None], run_suite: Callable[[str, Sequence[str], Path], int]) -> Result:
+    """Run a suite in a host, once that is set up."""
+    announce(f"Blender tests: {name}")
     try:
         setup.result()
     except ToolError as error:
         print(error, flush=True)
         return Result(name, problem=str(error).splitlines()[0], is_missing=True)
     try:
-        status = hosts.run_suite(name, ["-q"], report_of(name))
+        status = run_suite(host, ["-q"], report_of(name))
     except ToolError as error:
         print(error, flush=True)
         return Result(name, failed=1, problem=str(error).splitlines()[0])
@@ -130,7 +132,7 @@ def summarise(results: list[Result]) -> int:
     announce("summary")
     for result in results:
         counts = f"{result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped"
-        print(f"{result.name:<12} {counts}  {result.problem}")
+        print(f"{result.name:<18} {counts}  {result.problem}")
     missing = [result for result in results if result.is_missing]
     if missing:
         print_box([f"NOT TESTED in {result.name}: {result.problem}" for result in missing])

@@ -61,4 +61,5 @@ class Field:
         ratio = np.divide(self.isovalue, values, out=np.full_like(values, np.inf), where=values > 0)
         x0 = self.density_kernel.inverse(ratio)
         shares = np.where(np.isnan(x0), 0.0, np.sqrt(np.maximum(1 - x0, 0)))
-        return np.asarray(radii, np.float64) * shares[which]
+        kernel_radii: npt.NDArray[np.float64] = np.asarray(radii, np.float64) * shares[which]
+        return kernel_radii

@@ -219,7 +219,7 @@ def test_unusable_balls_are_counted_and_the_rest_is_rendered(fluid_scene: bpy.ty
     fluid_scene.objects["Balls"].data.vertices[2].co.x = float("nan")
     result = run("render", "--output", "//####.exr", "--frames", "1:2", "--json", str(tmp_path / "report.json"))
     assert result.status == 0
-    assert "Frame 1 (1/2): 1 balls were left out: 1 whose position is not finite" in result.err
+    assert "Frame 1 (1/2): 1 ball was left out: 1 whose position is not finite" in result.err
     assert result.out.splitlines()[-1].endswith("2 balls were left out because their position is not finite")
     frames = json.loads((tmp_path / "report.json").read_text())["frames"]
     assert [(frame["balls"], frame["dropped"]) for frame in frames] == [(2, {"position is not finite": 1})] * 2

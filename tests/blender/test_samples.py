@@ -47,35 +47,29 @@ def test_argon_has_velocities_and_lies_in_front_of_the_camera(sample, empty_scen
     assert share_in_view(empty_scene, balls.positions) == 1
 
 
-def test_the_dam_breaks_inside_its_tank(sample, empty_scene, read_balls):
+def test_the_dam_breaks_inside_its_tank_and_does_not_boil(sample, empty_scene, read_balls):
     dam_break = sample("dam_break")
-    dam_break.build(empty_scene, spacing=0.11, frame_end=30)
-    frames = [read_balls(frame) for frame in range(1, 31)]
+    dam_break.build(empty_scene, spacing=0.12, frame_end=40)
+    frames = [read_balls(frame) for frame in range(1, 41)]
     assert {len(balls) for balls in frames} == {len(frames[0])}
     every = np.stack([balls.positions for balls in frames])
     assert np.all(np.isfinite(every))
     length, depth, height = dam_break.TANK
-    assert every.min() > -0.03
-    assert np.all(every.max(axis=(0, 1)) < np.array([length, depth, 2 * height]) + 0.03)
-    # The block stands still at first; then its front runs to the far wall and its weight comes down.
+    # Blender lets a particle dip into a wall for a moment; it must not get lost there.
+    assert every.min() > -0.06
+    assert np.all(every.max(axis=(0, 1)) < np.array([length, depth, 2 * height]) + 0.06)
+    # The block stands still at first, every particle in a place of its own; then its front runs to the far wall.
+    assert len(np.unique(every[0].round(4), axis=0)) == len(every[0])
     assert every[0, :, 0].max() < dam_break.WATER[0]
     assert every[:, :, 0].max() > length - 0.1
-    assert every[-1, :, 2].mean() < 0.5 * every[0, :, 2].mean()
-
-
-def test_the_dam_keeps_its_volume_and_does_not_boil(sample, empty_scene, read_balls):
-    dam_break = sample("dam_break")
-    dam_break.build(empty_scene, spacing=0.11, frame_end=40)
-    length, depth, _ = dam_break.TANK
+    # Water at rest has its weight at half the level; walls without particles let a little more in.
     resting_level = np.prod(dam_break.WATER) / (length * depth)
-    for frame in (20, 30, 40):
-        balls = read_balls(frame)
-        # Water at rest has its weight at half the level; walls without particles let a little more in.
-        assert balls.positions[:, 2].mean() > 0.35 * resting_level
-        # Nothing is faster than what falls from the greatest splash, by far.
-        assert np.linalg.norm(balls.velocities, axis=1).max() < 25
-    fastest = np.sqrt(2 * 9.81 * dam_break.WATER[2])
-    assert np.sqrt(np.mean(np.sum(read_balls(40).velocities ** 2, axis=1))) < fastest / 2
+    assert 0.35 * resting_level < every[-1, :, 2].mean() < 0.7 * resting_level
+    # All of the energy is that of the fall, and some of it is lost.
+    fall = np.sqrt(9.81 * dam_break.WATER[2])
+    speeds = [np.sqrt(np.mean(np.sum(balls.velocities**2, axis=1))) for balls in frames]
+    assert 0.4 * fall < max(speeds) < fall
+    assert speeds[-1] < 0.6 * max(speeds)
 
 
 def test_the_dam_break_is_the_same_for_the_same_seed(sample, empty_scene, read_balls):

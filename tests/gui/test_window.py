@@ -1,0 +1,92 @@
+"""The extension in a Blender that has a window: what it draws, and that it leaves Blender's own drawing alone."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def emitter():
+    """The active object of a new file, with a particle system and used as fluid."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    item = bpy.data.objects["Cube"]
+    item.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    item.meniscus.use_fluid = True
+    return item
+
+
+@pytest.fixture
+def properties_editor():
+    """The properties editor of the window."""
+    screen = bpy.context.window_manager.windows[0].screen
+    return next(area for area in screen.areas if area.type == "PROPERTIES")
+
+
+def redraw():
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen):
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
+
+
+def screenshot(path):
+    """(height, width, 4) bytes of the window as it was drawn last."""
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window, screen=window.screen):
+        bpy.ops.screen.screenshot(filepath=str(path), check_existing=False)
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    shape = (image.size[1], image.size[0], 4)
+    bpy.data.images.remove(image)
+    return np.rint(pixels.reshape(shape) * 255).astype(np.uint8)
+
+
+@pytest.fixture
+def drawn_panels(meniscus, monkeypatch):
+    """The names of the panels that were drawn, closed ones opened."""
+    panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
+    names = []
+
+    def recorded(draw):
+        def draw_and_record(panel, context):
+            draw(panel, context)
+            names.append(type(panel).__name__)
+
+        return draw_and_record
+
+    panels.unregister()
+    with monkeypatch.context() as patch:
+        for panel in panels._CLASSES:
+            patch.setattr(panel, "bl_options", set())
+            patch.setattr(panel, "draw", recorded(panel.draw))
+        panels.register()
+        yield names
+        panels.unregister()
+    panels.register()
+
+
+@pytest.mark.parametrize(
+    ("tab", "panel"),
+    [("OBJECT", "MENISCUS_PT_object"), ("PARTICLES", "MENISCUS_PT_particles"), ("RENDER", "MENISCUS_PT_scene")],
+)
+@pytest.mark.parametrize("mode", ["PARTICLE", "ATTRIBUTE", "FIXED"])
+def test_panels_draw(emitter, properties_editor, drawn_panels, tab, panel, mode):
+    emitter.meniscus.radius_mode = mode
+    emitter.meniscus.color_mode = {"PARTICLE": "LOOK"}.get(mode, mode)
+    properties_editor.spaces.active.context = tab
+    redraw()
+    assert panel in drawn_panels
+
+
+def test_rendering_leaves_the_window_as_it_was(meniscus, emitter, tmp_path):
+    redraw()
+    before = screenshot(tmp_path / "before.png")
+    assert before.std() > 10
+    balls = meniscus.Balls([[0, 0, 0], [0.5, 0, 0]], 1.0)
+    camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=64, height=48)
+    for _ in range(3):
+        assert meniscus.render(balls, camera, meniscus.Field(), method="depth_peeling").hit.any()
+    redraw()
+    np.testing.assert_array_equal(screenshot(tmp_path / "after.png"), before)
