@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import register, unregister
+from .. import register
 from ..addon.fluid.balls import Balls
 from ..addon.fluid.errors import OutputError
 from .one_thread import bpy
@@ -42,8 +41,6 @@ def new_scene() -> bpy.types.Scene:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     if not hasattr(bpy.types.Object, "meniscus"):
         register()
-        # Blender's Python module hangs at its exit where panels are still registered.
-        atexit.register(unregister)
     return bpy.context.scene
 
 

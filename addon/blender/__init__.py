@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 from types import ModuleType
 
@@ -13,10 +14,14 @@ def register() -> None:
     """Register everything with Blender."""
     for module in _modules():
         module.register()
+    # The program disables its extensions before it quits. The Python module does not, and crashes (commands) or hangs
+    # (panels) at its exit, up to 4.5.
+    atexit.register(unregister)
 
 
 def unregister() -> None:
     """Undo `register`, the last first."""
+    atexit.unregister(unregister)
     for module in reversed(_modules()):
         module.unregister()
 

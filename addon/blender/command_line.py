@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import atexit
 import json
 import signal
 import sys
@@ -29,13 +28,10 @@ _commands: list[Any] = []
 def register() -> None:
     """Make ``--command meniscus`` known to Blender."""
     _commands.append(bpy.utils.register_cli_command("meniscus", main))
-    # Blender's Python module up to 4.5 crashes at its exit where a command is still registered.
-    atexit.register(unregister)
 
 
 def unregister() -> None:
     """Take the command away."""
-    atexit.unregister(unregister)
     bpy.utils.unregister_cli_command(_commands.pop())
 
 

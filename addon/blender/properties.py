@@ -68,8 +68,8 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
     )
     radius_factor: FloatProperty(
         name="Factor",
-        description="Influence radius by particle size; greater ones blend particles that are farther apart",
-        default=2.0,
+        description="Influence radius by particle size; 4 blends those that touch, more those farther apart",
+        default=4.0,
         min=0.0,
         soft_min=0.5,
         soft_max=8.0,
