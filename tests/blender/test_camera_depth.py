@@ -1,4 +1,4 @@
-"""Rays and planar depth are those of Cycles: its Depth pass of exact spheres agrees with an intersection in closed form."""
+"""Depth is that of Cycles: its Depth pass of exact spheres agrees with that of balls whose kernel spheres they are."""
 
 import importlib
 
@@ -10,24 +10,11 @@ from cycles_depth import add_spheres, cycles_depth
 RADIUS = 0.4
 
 
-def depth_of_spheres(camera, centres):
-    """(height, width) planar depth of the nearest front of spheres, in the camera's whole image; infinite where none is."""
-    origins, directions = camera.view_rays()
-    view_centres = centres @ camera.view_from_world[:3, :3].T + camera.view_from_world[:3, 3]
-    nearest = np.full(origins.shape[:2], np.inf)
-    for centre in view_centres:
-        to_centre = centre - origins
-        squared_length = np.sum(directions**2, axis=-1)
-        middle = np.sum(directions * to_centre, axis=-1) / squared_length
-        closest_squared = np.sum((to_centre - middle[..., None] * directions) ** 2, axis=-1)
-        half_squared = (RADIUS**2 - closest_squared) / squared_length
-        front = middle - np.sqrt(np.maximum(half_squared, 0))
-        hit = (half_squared > 0) & (front > camera.clip_start) & (front < camera.clip_end)
-        nearest = np.where(hit, np.minimum(nearest, front), nearest)
-    depth = np.full((camera.height, camera.width), np.inf)
-    region = camera.active_region
-    depth[region.y_min : region.y_max, region.x_min : region.x_max] = nearest
-    return depth
+def depth_of_balls(meniscus, centres, method="exact_intervals"):
+    """(height, width): the Depth pass of balls that look like spheres of `RADIUS`, too far apart to blend."""
+    field = meniscus.Field("quartic", 0.25)
+    balls = meniscus.Balls(centres, RADIUS / np.sqrt(0.5))
+    return meniscus.render(balls, read_camera(meniscus), field, method=method, passes=("depth",))["depth"]
 
 
 def build(scene, kind):
@@ -43,7 +30,9 @@ def build(scene, kind):
     scene.camera = camera
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 321, 201, 50
     scene.render.pixel_aspect_y = 1.25
-    centres = np.random.default_rng(3).uniform((-3, -3, -2), (3, 5, 3), (40, 3)).astype(np.float32)
+    lattice = np.stack(np.meshgrid(np.arange(-3, 3.1, 1.5), np.arange(-3, 6, 1.5), np.arange(-2, 3.1, 1.5)), axis=-1)
+    jitter = np.random.default_rng(3).uniform(-0.15, 0.15, lattice.shape)
+    centres = (lattice + jitter).reshape(-1, 3).astype(np.float32)
     add_spheres(scene, centres, RADIUS)
     return centres
 
@@ -71,11 +60,12 @@ def test_cycles_writes_what_meniscus_writes_where_there_is_nothing(meniscus, emp
     assert set(np.unique(depth[depth > 1e9])) == {np.float32(passes.DEPTH_BACKGROUND)}
 
 
+@pytest.mark.parametrize("method", ["exact_intervals", "depth_peeling"])
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-def test_depth_agrees_with_cycles(meniscus, empty_scene, tmp_path, kind):
+def test_depth_agrees_with_cycles(meniscus, empty_scene, tmp_path, kind, method):
     centres = build(empty_scene, kind)
     expected = cycles_depth(empty_scene, tmp_path)
-    assert_same_depth(depth_of_spheres(read_camera(meniscus), centres), expected)
+    assert_same_depth(depth_of_balls(meniscus, centres, method), expected)
 
 
 @pytest.mark.parametrize("use_crop", [False, True])
@@ -85,6 +75,5 @@ def test_render_border_agrees_with_cycles(meniscus, empty_scene, tmp_path, use_c
     render.use_border, render.use_crop_to_border = True, use_crop
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.213, 0.797, 0.331, 0.899
     expected = cycles_depth(empty_scene, tmp_path)
-    camera = read_camera(meniscus)
-    assert (camera.region is None) == use_crop
-    assert_same_depth(depth_of_spheres(camera, centres), expected)
+    assert (read_camera(meniscus).region is None) == use_crop
+    assert_same_depth(depth_of_balls(meniscus, centres), expected)
