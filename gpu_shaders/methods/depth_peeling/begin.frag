@@ -1,9 +1,7 @@
-// Every ray starts at the near clip distance with an empty list. AGAIN: only those whose list overflowed, the others keep
-// their surface.
-#include "lib/ray.glsl"
+// Every ray starts before all crossings with an empty list. AGAIN: only those whose list overflowed, the others keep their
+// surface.
 #include "methods/depth_peeling/state.glsl"
 
-uniform vec2 clip_distances; // planar
 #ifdef AGAIN
 uniform usampler2D state_tx;
 #endif
@@ -11,8 +9,7 @@ uniform usampler2D state_tx;
 layout(location = 0) out uvec4 out_state;
 
 void main() {
-    Ray ray = ray_from_pixel(gl_FragCoord.xy);
-    State state = State(0u, 0u, STATE_OUTSIDE, clip_distances.x * ray.stretch * depth_scale);
+    State state = State(0u, 0u, STATE_FRESH, BEFORE_ALL);
 #ifdef AGAIN
     State before = state_unpack(texelFetch(state_tx, ivec2(gl_FragCoord.xy), 0).xy);
     if (before.state != STATE_OVERFLOW)

@@ -6,9 +6,10 @@
 uniform float isovalue;
 uniform vec2 clip_distances; // planar
 
-// Whether the interval from the scaled distance `begin` is the first of its ray.
-bool interval_is_first(float begin, Ray ray) {
-    return begin == clip_distances.x * ray.stretch * depth_scale;
+// Whether a ray starts inside the fluid: the first interval that is searched tells. It begins at the near clip distance, or
+// where the ray enters its first influence sphere and the density is 0. `density`: its Bernstein form over the interval.
+uint interval_start(uint state, float density[KERNEL_DEGREE + 1]) {
+    return state != STATE_FRESH ? state : density[0] >= isovalue ? STATE_INSIDE : STATE_OUTSIDE;
 }
 
 // Where the density first comes to the isovalue, from below or, seen from inside, from above. `density`: its Bernstein

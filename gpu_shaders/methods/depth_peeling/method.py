@@ -23,6 +23,8 @@ _BALL_TEXTURE_WIDTH = 4096
 # Four list texels for each of 4 N_buf - 2 ids with N_buf = 4, as in the paper.
 _LIST_TARGETS = 4
 LIST_LENGTH = 4 * _LIST_TARGETS - 2
+# As in state.glsl.
+_STATE_OVERFLOW = 4
 # A band of rows of this many pixels takes some 250 MB.
 _PIXELS_PER_BAND = 2**20
 
@@ -255,7 +257,7 @@ class _Frame:
 
     def _count_overflows(self) -> int:
         words = np.frombuffer(self._state().read(), np.uint32)[::4]
-        return int(np.count_nonzero(words & 3 == 3))
+        return int(np.count_nonzero(words & 7 == _STATE_OVERFLOW))
 
     def _gather(self) -> None:
         targets = self._targets

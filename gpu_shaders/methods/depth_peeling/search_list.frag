@@ -15,18 +15,19 @@ layout(location = 1) out uvec4 out_list_1;
 layout(location = 2) out uvec4 out_list_2;
 layout(location = 3) out uvec4 out_list_3;
 
-float list_root(uint ids[14], uint count, float begin, float end, inout bool is_inside, bool is_first, Ray ray) {
-    if (count == 1u && !is_first) {
+// The root as a share of the interval; settles on which side of the surface the ray started.
+float list_root(uint ids[14], inout State state, float begin, float end, Ray ray) {
+    if (state.count == 1u && state.state != STATE_FRESH) {
         Chord chord = ball_chord(ball_fetch(ids[0]), ray);
-        return interval_kernel_sphere_root(chord, ball_density(ids[0]).y, begin, end, is_inside);
+        return interval_kernel_sphere_root(chord, ball_density(ids[0]).y, begin, end, state.state == STATE_INSIDE);
     }
     float density[KERNEL_DEGREE + 1];
     for (int i = 0; i <= KERNEL_DEGREE; i++)
         density[i] = 0.0;
-    for (uint i = 0u; i < count; i++)
+    for (uint i = 0u; i < state.count; i++)
         kernel_add_bernstein(density, ball_chord(ball_fetch(ids[i]), ray), ball_density(ids[i]).x, begin, end);
-    is_inside = is_first ? density[0] >= isovalue : is_inside;
-    return interval_root(density, is_inside);
+    state.state = interval_start(state.state, density);
+    return interval_root(density, state.state == STATE_INSIDE);
 }
 
 void main() {
@@ -44,10 +45,8 @@ void main() {
     } else if (state_is_peeling(state)) {
         Ray ray = ray_from_pixel(gl_FragCoord.xy);
         float root = BEZIER_NO_ROOT;
-        bool is_inside = state.state == STATE_INSIDE;
         if (depth > state.depth && state.count > 0u)
-            root = list_root(ids, state.count, state.depth / depth_scale, depth / depth_scale, is_inside,
-                             interval_is_first(state.depth, ray), ray);
+            root = list_root(ids, state, state.depth / depth_scale, depth / depth_scale, ray);
         uint crossing = texelFetch(crossing_tx, pixel, 0).x;
         uint id = (crossing - 1u) >> 1u;
         if (root <= 1.0) {
@@ -65,7 +64,6 @@ void main() {
             state.count++;
         }
         if (state_is_peeling(state)) {
-            state.state = is_inside ? STATE_INSIDE : STATE_OUTSIDE;
             state.crossing = crossing;
             state.depth = depth;
         }

@@ -20,14 +20,13 @@ void main() {
     } else if (state_is_peeling(state)) {
         Ray ray = ray_from_pixel(gl_FragCoord.xy);
         float root = BEZIER_NO_ROOT;
-        if (depth > state.depth) {
+        if (state.crossing != 0u && depth > state.depth) {
             float density[KERNEL_DEGREE + 1];
             vec4 sums[3] = vec4[3](texelFetch(density_0_tx, pixel, 0), texelFetch(density_1_tx, pixel, 0),
                                    texelFetch(density_2_tx, pixel, 0));
             for (int i = 0; i <= KERNEL_DEGREE; i++)
                 density[i] = sums[i / 4][i % 4];
-            if (interval_is_first(state.depth, ray))
-                state.state = density[0] >= isovalue ? STATE_INSIDE : STATE_OUTSIDE;
+            state.state = interval_start(state.state, density);
             root = interval_root(density, state.state == STATE_INSIDE);
         }
         if (root <= 1.0) {

@@ -14,7 +14,7 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     State state = state_unpack(texelFetch(state_tx, pixel, 0).xy);
     float depth = texelFetch(depth_tx, pixel, 0).x;
-    if (!state_is_peeling(state) || depth == 1.0)
+    if (!state_is_peeling(state) || state.crossing == 0u || depth == 1.0)
         discard;
     float begin = state.depth / depth_scale, end = depth / depth_scale;
     Chord chord = ball_chord(ball_fetch(v_id), ray_from_pixel(gl_FragCoord.xy));
