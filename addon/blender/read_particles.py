@@ -67,12 +67,22 @@ def _shown_systems(
             continue
         if not (modifier.show_viewport if viewport else modifier.show_render):
             continue
-        if depsgraph.mode == "VIEWPORT" and not modifier.show_viewport:
-            raise InputError(
-                f"The particle system '{modifier.particle_system.name}' of '{item.name}' is shown in renders only, "
-                "but Blender evaluates this render in the viewport: show its modifier there"
-            )
+        if depsgraph.mode == "VIEWPORT" and not viewport:
+            _check_whole_in_viewport(item, modifier)
         yield modifier.particle_system
+
+
+def _check_whole_in_viewport(item: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    """A render without Blender's render engines sees only what the viewport evaluates; less than a render shows is an error."""
+    system = modifier.particle_system
+    start = f"The particle system '{system.name}' of '{item.name}' is shown"
+    if not modifier.show_viewport:
+        raise InputError(f"{start} in renders only, but Blender evaluates this render in the viewport: show its modifier there")
+    if system.settings.display_percentage < 100:
+        raise InputError(
+            f"{start} to {system.settings.display_percentage} % in the viewport, where Blender evaluates this render: "
+            "set the amount of its viewport display to 100 %"
+        )
 
 
 def _read_system(source: Source, system: bpy.types.ParticleSystem, depsgraph: bpy.types.Depsgraph) -> BallPart:

@@ -191,11 +191,18 @@ def test_instances_of_an_emitter_carry_its_particles(meniscus, empty_scene):
 def test_particles_that_the_viewport_leaves_out_are_not_read(meniscus, empty_scene):
     item = add_emitter(empty_scene.collection, display_percentage=40)
     play(empty_scene, 6)
-    balls = read_balls(meniscus)
+    balls = read_balls(meniscus, viewport=True)
     assert 5 < len(balls) < 40
     heights = balls.positions[:, 2]
     assert heights.max() - heights.min() < 1e-4
     assert len(particles_by_blender(item)[0]) > len(balls)
+
+
+def test_system_that_the_viewport_thins_out_is_an_error_in_renders(meniscus, empty_scene):
+    add_emitter(empty_scene.collection, display_percentage=40)
+    play(empty_scene, 6)
+    with pytest.raises(input_error(meniscus), match="of 'Emitter' is shown to 40 % in the viewport"):
+        read_balls(meniscus)
 
 
 def test_system_that_renders_do_not_show_is_read_for_the_viewport_only(meniscus, empty_scene):
