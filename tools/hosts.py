@@ -140,7 +140,7 @@ def stage_for(name: str) -> Iterator[Stage]:
 
 def under_xvfb(folder: str) -> list[str]:
     """What starts a program with a screen that nobody sees; its pixels are in a file, whose path is in MENISCUS_SCREEN."""
-    screen = f"--server-args=-screen 0 1280x800x24 -fbdir {folder}/screen"
+    screen = f"--server-args=-screen 0 1280x800x24 -nocursor -fbdir {folder}/screen"
     return [f"MENISCUS_SCREEN={folder}/screen/Xvfb_screen0", "xvfb-run", "--auto-servernum", screen]
 
 
