@@ -14,8 +14,8 @@ import import_rules
 from environments import PACKAGES
 from project import ROOT, ToolError, command_line, run
 
-# bpy has no types that hold for all its versions, so addon/blender and the samples are not type-checked.
-TYPED = ("meniscus.addon.fluid", "meniscus.addon.output", "meniscus.addon.render", "meniscus.gpu_shaders")
+# bpy has no types that hold for all its versions, so addon/blender is not type-checked.
+TYPED = ("meniscus.addon.fluid", "meniscus.addon.output", "meniscus.addon.render", "meniscus.gpu_shaders", "meniscus.samples")
 
 MYPY_OPTIONS = ("--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(ROOT / ".mypy_cache"))
 
