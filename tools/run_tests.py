@@ -23,6 +23,7 @@ import extension_wheels
 import hosts
 import lint
 from project import ROOT, ToolError, command_line
+from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
 NO_TESTS_COLLECTED = 5
@@ -41,6 +42,7 @@ class Result:
 
 
 def run_all() -> list[Result]:
+    ensure_test_programs()
     with ThreadPoolExecutor(1) as background:
         wheels = background.submit(extension_wheels.download)
         ready = {name: background.submit(hosts.prepare, name) for name in hosts.names()}

@@ -33,6 +33,10 @@ LIBRARIES = {
 MESA_DRIVERS = ("*/dri/swrast_dri.so", "*/libgallium*.so", "*/dri/libdril_dri.so")
 
 
+# The reference compiler of GLSL.
+TEST_PROGRAMS = {"glslangValidator": "glslang-tools"}
+
+
 def is_root_on_debian() -> bool:
     return os.geteuid() == 0 and shutil.which("apt-get") is not None
 
@@ -57,6 +61,13 @@ def ensure_libraries() -> None:
         apt_install(missing)
     else:
         raise ToolError(f"System libraries are missing; install these Debian packages or their like: {' '.join(missing)}")
+
+
+def ensure_test_programs() -> None:
+    """Install what only the tests need, where that is possible; tests that miss a program say so themselves."""
+    missing = [package for program, package in TEST_PROGRAMS.items() if shutil.which(program) is None]
+    if missing and is_root_on_debian():
+        apt_install(missing)
 
 
 def missing_packages() -> list[str]:
