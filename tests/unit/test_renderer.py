@@ -149,3 +149,15 @@ def test_too_many_balls_for_a_method(monkeypatch):
 def test_unknown_pass_of_an_image_is_named():
     with pytest.raises(InputError, match="no pass 'normal', only depth"):
         render(passes=("depth",))["normal"]
+
+
+def test_image_does_not_depend_on_threads_and_bands(monkeypatch):
+    method = registry._import("addon.render.exact_intervals", "method")
+    whole = render()
+    monkeypatch.setattr(method, "_PAIRS_PER_BAND", 500)
+    monkeypatch.setattr(method, "_MAX_THREADS", 5)
+    monkeypatch.setattr(method.os, "cpu_count", lambda: 5)
+    in_bands = render()
+    for name in ALL_PASSES:
+        np.testing.assert_array_equal(in_bands[name], whole[name])
+    assert in_bands.info.counts == whole.info.counts

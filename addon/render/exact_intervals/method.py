@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +17,9 @@ from ...fluid.view_balls import ViewBalls
 from ..method import Surface
 from .crossings import FloatArray, IntArray, Rays, Spheres, blended_colors, cross, first_crossings, normals
 
-# Candidate pairs of a band of rows; some 500 bytes each while they are worked on.
+# Candidate pairs of a band of rows; some 500 bytes each while they are worked on, in each thread.
 _PAIRS_PER_BAND = 400_000
+_MAX_THREADS = 8
 
 
 class ExactIntervals:
@@ -31,31 +34,43 @@ class ExactIntervals:
         self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
     ) -> Surface:
         """See :meth:`method.Method.find_surface`."""
-        depth = np.full((camera.height, camera.width), np.inf, np.float32)
-        normal = np.zeros((camera.height, camera.width, 3), np.float32)
-        colors = balls.colors if wants_color else None
-        color = None if colors is None else np.zeros_like(normal)
-        spheres = Spheres(balls.centers, balls.radii, balls.weights, balls.kernel_radii)
+        surface = Surface(
+            np.full((camera.height, camera.width), np.inf, np.float32),
+            np.zeros((camera.height, camera.width, 3), np.float32),
+            np.zeros((camera.height, camera.width, 3), np.float32) if wants_color and balls.colors is not None else None,
+        )
         covered = pixel_bounds(balls, camera)
-        pair_count = 0
-        for begin, end in _bands(covered, camera.height):
+
+        def fill(band: tuple[int, int]) -> int:
             check_cancelled()
-            rays, stretch = _rays(camera, begin, end)
-            pairs = cross(rays, spheres, *_candidates(covered, camera.width, begin, end))
-            t = first_crossings(rays, spheres, pairs, field)
-            rows = (end - begin, camera.width)
-            depth[begin:end] = (t / stretch).reshape(rows)
-            in_view = normals(rays, spheres, pairs, t, field)
-            normal[begin:end] = (in_view @ camera.world_from_view[:3, :3].T).reshape(*rows, 3)
-            if color is not None and colors is not None:
-                color[begin:end] = blended_colors(rays, spheres, pairs, t, field, colors).reshape(*rows, 3)
-            pair_count += len(pairs.ray)
-        return Surface(depth, normal, color, {"ray_ball_pairs": pair_count})
+            return _fill_rows(surface, band, balls, camera, field, covered)
+
+        # numpy lets other threads run while it computes.
+        with ThreadPoolExecutor(min(os.cpu_count() or 1, _MAX_THREADS)) as pool:
+            surface.counts["ray_ball_pairs"] = sum(pool.map(fill, _bands(covered, camera.height)))
+        return surface
 
 
 def create() -> ExactIntervals:
     """The method, ready to run."""
     return ExactIntervals()
+
+
+def _fill_rows(
+    surface: Surface, band: tuple[int, int], balls: ViewBalls, camera: Camera, field: Field, covered: IntArray
+) -> int:
+    """Find the surface in the rows [begin, end) of `band`; the number of pairs of rays and influence spheres that meet."""
+    rows, shape = slice(*band), (band[1] - band[0], camera.width)
+    spheres = Spheres(balls.centers, balls.radii, balls.weights, balls.kernel_radii)
+    rays, stretch = _rays(camera, *band)
+    pairs = cross(rays, spheres, *_candidates(covered, camera.width, *band))
+    t = first_crossings(rays, spheres, pairs, field)
+    surface.depth[rows] = (t / stretch).reshape(shape)
+    in_view = normals(rays, spheres, pairs, t, field)
+    surface.normal[rows] = (in_view @ camera.world_from_view[:3, :3].T).reshape(*shape, 3)
+    if surface.color is not None and balls.colors is not None:
+        surface.color[rows] = blended_colors(rays, spheres, pairs, t, field, balls.colors).reshape(*shape, 3)
+    return len(pairs.ray)
 
 
 def pixel_bounds(balls: ViewBalls, camera: Camera) -> IntArray:
