@@ -130,6 +130,13 @@ def long_lists() -> Scene:
     return Scene(meniscus.Balls(_random_positions(50, 7, 0.8), 0.9, weights=0.06))
 
 
+def crowded_corner() -> Scene:
+    """A few balls, and in a corner so many over one another that lists overflow there and nowhere else."""
+    corner = _random_positions(40, 10, 0.2) + [1.2, 0, 0.9]
+    radii, weights = np.repeat([0.9, 0.5], [10, 40]), np.repeat([1, 0.06], [10, 40])
+    return Scene(meniscus.Balls(np.concatenate([_random_positions(10, 1, 2), corner]), radii, weights))
+
+
 def negative_weights() -> Scene:
     """A ball carves into others; kernel spheres no longer bound the surface."""
     return Scene(meniscus.Balls([[-0.3, 0, 0], [0.4, 0.2, 0], [0.1, -0.5, 0.2]], [1.0, 1.0, 0.8], weights=[1, 1, -0.9]))
@@ -157,6 +164,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
         random_5000,
         lattice_with_droplets,
         long_lists,
+        crowded_corner,
         negative_weights,
     )
 } | {f"kernel_{name}": _with_kernel(name) for name in ("quartic", "poly6", "power_4", "power_1")}

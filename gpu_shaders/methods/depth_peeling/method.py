@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 
@@ -167,6 +168,12 @@ def _corner(camera: Camera) -> tuple[float, float]:
     return max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
 
 
+def _bounding_box(mask: npt.NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """x, y, width and height of the least box around the pixels of a mask that has some."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return int(columns[0]), int(rows[0]), int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1
+
+
 class _Targets:
     """The images that are drawn into, two of each that is read while its successor is written."""
 
@@ -186,6 +193,18 @@ class _Targets:
         self.finish = gl.framebuffer(self.outputs)
         for texture in [self.crossing, *self.lists[0], *self.lists[1], *self.sums, *self.outputs]:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    @contextmanager
+    def spheres_only_within(self, box: tuple[int, int, int, int]) -> Iterator[None]:
+        """Peel and sum only in a box of pixels (x, y, width, height)."""
+        framebuffers = [*self.peel, self.sum]
+        for framebuffer in framebuffers:
+            framebuffer.scissor = box
+        try:
+            yield
+        finally:
+            for framebuffer in framebuffers:
+                framebuffer.scissor = (0, 0, *self.size)
 
 
 class _Frame:
@@ -224,13 +243,15 @@ class _Frame:
         self._gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
         self._over_screen("begin", self._targets.whole_list[0])
         peels = self._peel("search_list", self._targets.whole_list, sums=False)
-        overflows = self._count_overflows()
-        if overflows:
+        overflowed = self._overflowed()
+        if overflowed.any():
             self._over_screen("begin_again", self._targets.state_only[1 - self._now], state_tx=self._state())
             self._now = 1 - self._now
-            peels += self._peel("search_sum", self._targets.state_only, sums=True)
+            # Often it is a handful of pixels: spheres elsewhere need not be drawn.
+            with self._targets.spheres_only_within(_bounding_box(overflowed)):
+                peels += self._peel("search_sum", self._targets.state_only, sums=True)
         self._gather()
-        return {"peels": peels, "overflows": overflows}
+        return {"peels": peels, "overflows": int(np.count_nonzero(overflowed))}
 
     def _state(self) -> moderngl.Texture:
         return self._targets.lists[self._now][0]
@@ -255,9 +276,12 @@ class _Frame:
             self._now = 1 - self._now
         return 2 * self._ball_count + 1
 
-    def _count_overflows(self) -> int:
-        words = np.frombuffer(self._state().read(), np.uint32)[::4]
-        return int(np.count_nonzero(words & 7 == _STATE_OVERFLOW))
+    def _overflowed(self) -> npt.NDArray[np.bool_]:
+        """(height, width): the pixels whose list was too short."""
+        width, height = self._targets.size
+        words = np.frombuffer(self._state().read(), np.uint32).reshape(height, width, 4)[..., 0]
+        overflowed: npt.NDArray[np.bool_] = words & 7 == _STATE_OVERFLOW
+        return overflowed
 
     def _gather(self) -> None:
         targets = self._targets
