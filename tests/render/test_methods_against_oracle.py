@@ -46,6 +46,20 @@ def test_overflow_is_counted_only_where_it_happens():
     assert meniscus.render(scene.balls, camera, scene.field, method="depth_peeling").info.counts["overflows"] == 0
 
 
+def test_depth_peeling_in_bands_gives_the_same_image(monkeypatch):
+    from meniscus.gpu_shaders.methods.depth_peeling import method
+
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera("perspective")
+    whole = meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
+    # Fourteen rows a band; the last has only two.
+    monkeypatch.setattr(method, "_PIXELS_PER_BAND", 14 * camera.width)
+    in_bands = meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
+    judge(in_bands, scene, camera)
+    np.testing.assert_array_equal(in_bands.hit, whole.hit)
+    np.testing.assert_allclose(in_bands["depth"], whole["depth"], rtol=1e-5)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_colors_blend_by_their_share_of_the_density(method):
     # Half way between two equal balls both colours count alike; on the far side of one only its own.

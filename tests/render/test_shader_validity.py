@@ -45,7 +45,9 @@ def validator():
 @pytest.mark.parametrize("method", GPU_METHODS)
 def test_shaders_are_valid(method, kernel, compiled_shaders, validator, tmp_path):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=8, height=8)
-    meniscus.render(meniscus.Balls([[0, 0, 0]], 1.0), camera, meniscus.Field(kernel), method=method)
+    for colors in (None, (1, 0, 0)):
+        balls = meniscus.Balls([[0, 0, 0]], 1.0, colors=colors)
+        meniscus.render(balls, camera, meniscus.Field(kernel), method=method, passes=("combined",))
     assert len(compiled_shaders) >= 2
     for index, (path, text) in enumerate(compiled_shaders):
         shader = tmp_path / f"{index}.{path.rpartition('.')[2]}"

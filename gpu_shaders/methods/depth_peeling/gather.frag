@@ -4,7 +4,9 @@
 #include "methods/depth_peeling/state.glsl"
 
 uniform usampler2D state_tx;
+#if WITH_COLORS
 uniform sampler2D color_tx;
+#endif
 
 flat in uint v_id;
 layout(location = 0) out vec4 out_gradient; // view space, against the gradient
@@ -29,5 +31,9 @@ void main() {
     float weight = ball_density(v_id).x;
     out_gradient = vec4(weight * kernel_derivative(x) / chord.radius * from_center, 0.0);
     float share = max(weight * kernel_value(x), 0.0);
+#if WITH_COLORS
     out_color = vec4(share * texelFetch(color_tx, ball_texel(v_id), 0).rgb, share);
+#else
+    out_color = vec4(0.0, 0.0, 0.0, share);
+#endif
 }

@@ -70,10 +70,12 @@ class DepthPeeling:
         self, balls: ViewBalls, camera: Camera, field: Field, surface: Surface, check_cancelled: Callable[[], None]
     ) -> None:
         """Fill `surface` band by band; on the context's thread."""
-        textures = _ball_textures(self._context.gl, balls)
+        colors = balls.colors if surface.color is not None else None
+        textures = _ball_textures(self._context.gl, balls, colors)
         constants = {
             "BALL_TEXTURE_WIDTH": _BALL_TEXTURE_WIDTH,
             "LIST_LENGTH": self._list_length,
+            "WITH_COLORS": int(colors is not None),
             **kernel_constants(field.density_kernel),
         }
         for band in _bands(camera):
@@ -121,14 +123,16 @@ def _bands(camera: Camera) -> Iterator[Region]:
         yield Region(0, begin, camera.width, min(begin + rows, camera.height))
 
 
-def _ball_textures(gl: moderngl.Context, balls: ViewBalls) -> dict[str, moderngl.Texture]:
+def _ball_textures(
+    gl: moderngl.Context, balls: ViewBalls, colors: npt.NDArray[np.float32] | None
+) -> dict[str, moderngl.Texture]:
     """The balls as float textures, by sampler name."""
-    colors = np.zeros((1, 3), np.float32) if balls.colors is None else balls.colors
     arrays = {
         "sphere_tx": np.column_stack([balls.centers, balls.radii]).astype(np.float32),
         "density_tx": np.column_stack([balls.weights, balls.kernel_radii]).astype(np.float32),
-        "color_tx": np.column_stack([colors, np.ones(len(colors))]).astype(np.float32),
     }
+    if colors is not None:
+        arrays["color_tx"] = np.column_stack([colors, np.ones(len(colors), np.float32)])
     return {name: _texture_of_rows(gl, array) for name, array in arrays.items()}
 
 
