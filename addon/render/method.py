@@ -61,6 +61,13 @@ class Surface:
     color: npt.NDArray[np.float32] | None = None
     counts: dict[str, int] = field(default_factory=dict)
 
+    @classmethod
+    def empty(cls, camera: Camera, with_color: bool) -> Surface:
+        """The surface of nothing, for a method to fill."""
+        shape = (camera.height, camera.width)
+        color = np.zeros((*shape, 3), np.float32) if with_color else None
+        return cls(np.full(shape, np.inf, np.float32), np.zeros((*shape, 3), np.float32), color)
+
 
 class Method(Protocol):
     """A way to find the surface."""

@@ -125,11 +125,12 @@ def _timed(report: RenderInfo, stage: str) -> Iterator[None]:
 def _image(surface: Surface, camera: Camera, names: tuple[str, ...], look: Look, report: RenderInfo) -> ImageBuffers:
     """Derive the passes of the region and put them into the whole image."""
     hit = np.isfinite(surface.depth)
+    cropped = camera.cropped()
     makers: dict[str, Callable[[], npt.NDArray[np.float32]]] = {
         "depth": lambda: surface.depth,
         "normal": lambda: surface.normal,
-        "position": lambda: _positions(surface.depth, hit, camera.cropped()),
-        "combined": lambda: headlight(surface.normal, _world_directions(camera.cropped()), surface.color, hit, look),
+        "position": lambda: _positions(surface.depth, hit, cropped),
+        "combined": lambda: headlight(surface.normal, _world_directions(cropped), surface.color, hit, look),
     }
     images = {}
     for name in names:

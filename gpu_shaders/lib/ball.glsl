@@ -29,9 +29,13 @@ vec2 ball_density(uint id) {
     return texelFetch(density_tx, ball_texel(id), 0).xy;
 }
 
+// From the ray to the centre in the plane of the centre's depth; the only subtraction of large numbers.
+vec2 ball_offset(Ball ball, Ray ray) {
+    return ball.center.xy - ray.origin + ball.center.z * ray.slope;
+}
+
 Chord ball_chord(Ball ball, Ray ray) {
-    // From the ray to the centre in the plane of the centre's depth; the only subtraction of large numbers.
-    vec2 offset = ball.center.xy - ray.origin + ball.center.z * ray.slope;
+    vec2 offset = ball_offset(ball, ray);
     float along = dot(offset, ray.slope);
     float turn = offset.x * ray.slope.y - offset.y * ray.slope.x;
     // |offset x direction|^2 / |direction|^2: nothing cancels.

@@ -34,11 +34,7 @@ class ExactIntervals:
         self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
     ) -> Surface:
         """See :meth:`method.Method.find_surface`."""
-        surface = Surface(
-            np.full((camera.height, camera.width), np.inf, np.float32),
-            np.zeros((camera.height, camera.width, 3), np.float32),
-            np.zeros((camera.height, camera.width, 3), np.float32) if wants_color and balls.colors is not None else None,
-        )
+        surface = Surface.empty(camera, wants_color and balls.colors is not None)
         covered = pixel_bounds(balls, camera)
 
         def fill(band: tuple[int, int]) -> int:

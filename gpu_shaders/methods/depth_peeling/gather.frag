@@ -25,7 +25,7 @@ void main() {
         discard;
     vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
     // From the centre to the middle of the chord, then along the chord.
-    vec2 offset = ball.center.xy - ray.origin + ball.center.z * ray.slope;
+    vec2 offset = ball_offset(ball, ray);
     vec3 to_middle = -vec3(offset, 0.0) + direction * (dot(offset, ray.slope) / ray.stretch);
     vec3 from_center = to_middle / chord.radius + direction * from_middle;
     float weight = ball_density(v_id).x;

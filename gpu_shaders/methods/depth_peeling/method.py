@@ -21,7 +21,7 @@ from .params import METHOD
 
 _FOLDER = "methods/depth_peeling"
 _BALL_TEXTURE_WIDTH = 4096
-# Four list texels for each of 4 N_buf - 2 ids with N_buf = 4, as in the paper.
+# N_buf render targets of four words hold the state, which takes two, and 4 N_buf - 2 = 14 ids, as in the paper.
 _LIST_TARGETS = 4
 LIST_LENGTH = 4 * _LIST_TARGETS - 2
 # As in state.glsl.
@@ -56,12 +56,8 @@ class DepthPeeling:
         self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
     ) -> Surface:
         """See :meth:`method.Method.find_surface`."""
-        surface = Surface(
-            np.full((camera.height, camera.width), np.inf, np.float32),
-            np.zeros((camera.height, camera.width, 3), np.float32),
-            np.zeros((camera.height, camera.width, 3), np.float32) if wants_color and balls.colors is not None else None,
-            {"peels": 0, "overflows": 0},
-        )
+        surface = Surface.empty(camera, wants_color and balls.colors is not None)
+        surface.counts = {"peels": 0, "overflows": 0}
         if len(balls):
             self._context.run(lambda: self._draw(balls, camera, field, surface, check_cancelled))
         return surface
@@ -83,11 +79,11 @@ class DepthPeeling:
             frame = _Frame(self._context, self._targets_for(part), constants, len(balls), check_cancelled)
             frame.bind(textures, _uniforms(balls, part, field))
             counts = frame.peel_all()
-            normal_depth, color = frame.read()
             rows = slice(band.y_min, band.y_max)
+            normal_depth = frame.read(0)
             surface.normal[rows], surface.depth[rows] = normal_depth[..., :3], normal_depth[..., 3]
             if surface.color is not None:
-                surface.color[rows] = color[..., :3]
+                surface.color[rows] = frame.read(1)[..., :3]
             for name, count in counts.items():
                 surface.counts[name] += count
 
@@ -294,13 +290,10 @@ class _Frame:
         read = {"state_tx": self._state(), "gradient_tx": targets.sums[0], "color_sum_tx": targets.sums[1]}
         self._over_screen("finish", targets.finish, **read)
 
-    def read(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-        """(height, width, 4) each: normal and depth, colour."""
+    def read(self, output: int) -> npt.NDArray[np.float32]:
+        """(height, width, 4): an output of finish.frag."""
         width, height = self._targets.size
-        surface, color = (
-            np.frombuffer(texture.read(), np.float32).reshape(height, width, 4) for texture in self._targets.outputs
-        )
-        return surface, color
+        return np.frombuffer(self._targets.outputs[output].read(), np.float32).reshape(height, width, 4)
 
     def _over_screen(self, step: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
         # The depth buffer is written, never asked.
