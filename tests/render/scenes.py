@@ -84,6 +84,13 @@ def eye_inside_influence_sphere() -> Scene:
     return Scene(meniscus.Balls([[0, 0, 0], [0.9, 1.8, 0.3], [0, -0.5, -0.4]], [1.4, 1.2, 0.6]), eye=(0.0, -1.0, 0.1))
 
 
+def eye_behind_kernel_sphere() -> Scene:
+    """The eye has left a ball, is still in its influence sphere, and looks at others."""
+    return Scene(
+        meniscus.Balls([[0, -1.5, 0], [0.3, 1, 0], [-0.5, 1.6, 0.2]], [1.4, 0.9, 0.8]), eye=(0.0, -0.4, 0.0), view_height=0.8
+    )
+
+
 def eye_inside_fluid() -> Scene:
     """The surface is seen from within."""
     return Scene(meniscus.Balls(_random_positions(60, 2, 2), 0.9), eye=(0.05, -0.3, 0.0), view_height=1.0)
@@ -157,6 +164,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
         tangent_rays,
         ball_behind_ball,
         eye_inside_influence_sphere,
+        eye_behind_kernel_sphere,
         eye_inside_fluid,
         near_clip_cuts_fluid,
         far_from_origin,

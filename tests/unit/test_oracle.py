@@ -84,6 +84,15 @@ def test_surface_behind_the_origin_is_not_seen():
     assert np.isinf(cast_one(meniscus.Balls([[0, 0, 0]], 1.0), meniscus.Field(), (0, 1.5, 0))[0])
 
 
+def test_surface_behind_the_origin_hides_nothing_ahead():
+    # The ray starts outside the fluid, behind a kernel sphere whose influence sphere it is still in.
+    field = meniscus.Field("quartic", 0.25)
+    balls = meniscus.Balls([[0, 0, 0], [0, 4, 0]], 1.0)
+    t, normal = cast_one(balls, field, (0, 0.9, 0))
+    assert t == pytest.approx(4 - np.sqrt(0.5) - 0.9, abs=1e-12)
+    np.testing.assert_allclose(normal, (0, -1, 0), atol=1e-12)
+
+
 def test_directions_need_not_be_unit():
     balls, field = meniscus.Balls([[0, 0, 0]], 1.0), meniscus.Field()
     assert cast_one(balls, field, (0, -4, 0), (0, 50, 0))[0] == pytest.approx(cast_one(balls, field, (0, -4, 0))[0], abs=1e-12)

@@ -143,7 +143,9 @@ def _before_kernel_spheres(rays: Rays, spheres: Spheres, pairs: Pairs, inside: n
         return pairs
     radius, kernel_radius = spheres.radii[pairs.ball], spheres.kernel_radii[pairs.ball]
     half_chord_2 = kernel_radius**2 - (1 - pairs.peak) * radius**2
-    front = np.where(half_chord_2 > 0, pairs.middle - np.sqrt(np.maximum(half_chord_2, 0)), np.inf)
+    front = pairs.middle - np.sqrt(np.maximum(half_chord_2, 0))
+    # A kernel sphere behind the ray's start, whose influence sphere it is still in, hides nothing.
+    front = np.where((half_chord_2 > 0) & (front >= rays.start[pairs.ray]), front, np.inf)
     nearest = np.full(len(rays), np.inf)
     np.minimum.at(nearest, pairs.ray, front)
     # Keep the neighbourhood of the front itself, where the root may be.
