@@ -1,0 +1,58 @@
+//! Arrays that fail with an error where the system has too little memory; Rust's own would abort the process, and Blender
+//! with it. Everything whose size goes with the number of balls or pixels is made here.
+
+use crate::error::{Error, Result};
+
+/// An empty vector with room for `count` elements.
+///
+/// # Errors
+/// `OutOfMemory` where the system has not as much.
+pub fn with_capacity<T>(count: usize) -> Result<Vec<T>> {
+    let mut vector = Vec::new();
+    vector.try_reserve_exact(count).map_err(|_| Error::OutOfMemory(count.saturating_mul(size_of::<T>())))?;
+    Ok(vector)
+}
+
+/// A vector of `count` copies of `value`.
+///
+/// # Errors
+/// `OutOfMemory` where the system has not as much.
+pub fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>> {
+    let mut vector = with_capacity(count)?;
+    vector.resize(count, value);
+    Ok(vector)
+}
+
+/// Asks the processor to fetch what will soon be read; does nothing where that cannot be asked for.
+#[inline(always)]
+pub fn prefetch<T>(soon: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a prefetch reads nothing that the program can see, and every x86-64 processor has it.
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(soon).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = soon;
+}
+
+/// Makes room for `count` more elements, and for as many as are there already where it must move.
+///
+/// # Errors
+/// `OutOfMemory` where the system has not as much.
+pub fn reserve<T>(vector: &mut Vec<T>, count: usize) -> Result<()> {
+    vector.try_reserve(count).map_err(|_| Error::OutOfMemory(count.saturating_mul(size_of::<T>())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg_attr(miri, ignore = "Miri ends where memory does")]
+    fn too_much_is_an_error() {
+        assert_eq!(filled(0u64, usize::MAX / 64), Err(Error::OutOfMemory(usize::MAX / 64 * 8)));
+        assert_eq!(filled(7u8, 3), Ok(vec![7; 3]));
+        assert_eq!(reserve(&mut vec![0u64], usize::MAX / 64), Err(Error::OutOfMemory(usize::MAX / 64 * 8)));
+    }
+}

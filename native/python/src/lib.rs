@@ -1,0 +1,27 @@
+//! `meniscus_native`: meniscus-core for Python. Arrays are borrowed, the GIL is released, and nothing aborts the process:
+//! bad input is a ValueError, too little memory a MemoryError, a defect of ours a RuntimeError.
+
+mod arrays;
+mod fitted_bvh;
+mod oracle;
+mod run;
+mod tile_caster;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod meniscus_native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::fitted_bvh::FittedBvh;
+    #[pymodule_export]
+    use super::oracle::{oracle_cast, oracle_crossings};
+    #[pymodule_export]
+    use super::tile_caster::{TileCaster, simd_path, simd_paths};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
