@@ -15,12 +15,14 @@ _HOMES = {
     "Balls": ".addon.fluid.balls",
     "Camera": ".addon.fluid.camera",
     "Field": ".addon.fluid.field",
+    "FittedBvh": ".addon.render.fitted_bvh",
     "ImageBuffers": ".addon.fluid.image",
     "Look": ".addon.fluid.look",
     "MeniscusError": ".addon.fluid.errors",
     "methods": ".addon.render.registry",
     "oracle": ".addon.render.oracle",
     "render": ".addon.render.renderer",
+    "render_progressively": ".addon.render.renderer",
     "write_exr": ".addon.output.exr",
 }
 

@@ -178,11 +178,17 @@ def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bo
         passes=passes,
         look=read_look(job.scene),
         is_cancelled=is_cancelled,
+        threads=_threads(job.scene),
     )
     image.info.milliseconds = {**milliseconds, **image.info.milliseconds}
     report.info = image.info
     report.left_out = balls.dropped_text
     return image
+
+
+def _threads(scene: bpy.types.Scene) -> int:
+    """How many threads the scene's performance settings allow, 0 for one a core."""
+    return int(scene.render.threads) if scene.render.threads_mode == "FIXED" else 0
 
 
 def _write_preview(image: ImageBuffers, report: FrameReport) -> None:

@@ -185,6 +185,13 @@ class Camera:
         )
         return replace(self, window=window, width=region.width, height=region.height, region=None)
 
+    def pixel_centers(self) -> tuple[FloatArray, FloatArray]:
+        """Where the region's columns and rows of pixels lie in the window: (width,) and (height,)."""
+        region, (pixel_width, pixel_height) = self.active_region, self.pixel_size
+        x = self.window.left + (np.arange(region.x_min, region.x_max) + 0.5) * pixel_width
+        y = self.window.bottom + (np.arange(region.y_min, region.y_max) + 0.5) * pixel_height
+        return x.astype(np.float64, copy=False), y.astype(np.float64, copy=False)
+
     def view_rays(self) -> tuple[FloatArray, FloatArray]:
         """Rays through the pixel centres of the region, in view space.
 
@@ -193,10 +200,8 @@ class Camera:
         origins, directions : (height, width, 3) of the region, row 0 at the bottom. Directions are not unit but have
         z = -1, so the distance along them is planar depth.
         """
-        region, (pixel_width, pixel_height) = self.active_region, self.pixel_size
-        x = self.window.left + (np.arange(region.x_min, region.x_max) + 0.5) * pixel_width
-        y = self.window.bottom + (np.arange(region.y_min, region.y_max) + 0.5) * pixel_height
-        plane = np.zeros((region.height, region.width, 3))
+        x, y = self.pixel_centers()
+        plane = np.zeros((len(y), len(x), 3))
         plane[..., 0], plane[..., 1] = x, y[:, None]
         forward = np.broadcast_to(np.array([0.0, 0.0, -1.0]), plane.shape)
         return (np.zeros_like(plane), plane + forward) if self.is_perspective else (plane, forward.copy())

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
+from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.field import Field
-from ..fluid.view_balls import ViewBalls
+from ..fluid.passes import DEPTH_BACKGROUND
 
 Backend = Literal["gpu", "cpu"]
+Attribute = Literal["color", "velocity", "ball"]
 
 
 @dataclass(frozen=True)
@@ -26,47 +30,75 @@ class MethodInfo:
         The identifier, and what the user interface shows.
     backend
         "gpu" runs through OpenGL, "cpu" without it.
+    attributes
+        What it finds beside depth and normal.
     gl_version
         Least OpenGL version as moderngl writes it (330), 0 on the CPU.
-    max_balls
-        How many balls may meet the view at once.
     """
 
     name: str
     label: str
     description: str
     backend: Backend
+    attributes: frozenset[Attribute]
     gl_version: int = 0
-    max_balls: int = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a method is asked for.
+
+    Attributes
+    ----------
+    balls, camera, field
+        What is seen, from where, and which isosurface of it. The camera has no region.
+    attributes
+        What is wanted beside depth and normal.
+    threads
+        How many threads may work on the CPU, 0 for one a core.
+    watch
+        To be called often with the share of the work that is done, 0 to 1; raises CancelledError when the user gave up.
+    """
+
+    balls: Balls
+    camera: Camera
+    field: Field
+    attributes: frozenset[Attribute]
+    threads: int
+    watch: Callable[[float], None]
 
 
 @dataclass
 class Surface:
-    """What a method finds: float32 arrays of the camera's whole image, row 0 at the bottom.
+    """What a method finds: arrays of the camera's whole image, row 0 at the bottom.
 
     Attributes
     ----------
     depth
-        (height, width): planar distance of the first crossing of the isosurface, infinite where there is none.
+        (height, width) float32: planar distance of the first crossing of the isosurface, DEPTH_BACKGROUND where there is none.
     normal
-        (height, width, 3): unit, world space, out of the fluid (against the gradient); 0 where there is nothing.
-    color
-        (height, width, 3): the balls' colours, each weighted by its share of the density there; None where not asked for.
-    counts
-        What happened, by name.
+        (height, width, 3) float32: unit, world space, out of the fluid (against the gradient); 0 where there is nothing.
+    color, velocity
+        (height, width, 3) float32: the balls' values, each weighted by its share of the density there, 0 where there is
+        nothing; None where not asked for or not known.
+    ball
+        (height, width) int32: index of the ball with the greatest share, -1 where there is nothing; None where not asked for.
+    milliseconds, counts
+        Wall time by stage in order, and what happened, by name.
     """
 
     depth: npt.NDArray[np.float32]
     normal: npt.NDArray[np.float32]
     color: npt.NDArray[np.float32] | None = None
+    velocity: npt.NDArray[np.float32] | None = None
+    ball: npt.NDArray[np.int32] | None = None
+    milliseconds: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
 
-    @classmethod
-    def empty(cls, camera: Camera, with_color: bool) -> Surface:
-        """The surface of nothing, for a method to fill."""
-        shape = (camera.height, camera.width)
-        color = np.zeros((*shape, 3), np.float32) if with_color else None
-        return cls(np.full(shape, np.inf, np.float32), np.zeros((*shape, 3), np.float32), color)
+    @property
+    def hit(self) -> npt.NDArray[np.bool_]:
+        """(height, width): where there is a surface."""
+        return self.depth < DEPTH_BACKGROUND
 
 
 class Method(Protocol):
@@ -77,12 +109,26 @@ class Method(Protocol):
         """The processor that it runs on, as the user knows it."""
         ...
 
-    def find_surface(
-        self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
-    ) -> Surface:
+    def find_surface(self, request: Request) -> Surface:
         """The first surface along each pixel's ray between the clip distances.
 
-        `camera` has no region. `check_cancelled` raises CancelledError when the user gave up; call it often.
         A ray that starts inside the fluid sees the surface from within.
         """
         ...
+
+
+@runtime_checkable
+class ProgressiveMethod(Method, Protocol):
+    """A method that can show a coarse image early."""
+
+    def find_surfaces(self, request: Request) -> Iterator[Surface]:
+        """The same surface several times, from coarse to fine; the last is that of :meth:`find_surface`."""
+        ...
+
+
+@contextmanager
+def timed(milliseconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note how long the block takes as a stage."""
+    start = time.perf_counter()
+    yield
+    milliseconds[stage] = (time.perf_counter() - start) * 1e3

@@ -1,6 +1,13 @@
-"""The exact caster that everything else is judged by: any rays, all crossings, double precision."""
+"""The exact caster that everything else is judged by: any rays, all crossings, double precision.
+
+The fluid is where the density exceeds the isovalue. A crossing is where a ray goes from outside to inside or back, at a
+distance greater than 0: crossings alternate, and the surface at the very start of a ray is not seen. A ray that only touches
+the fluid does not cross it.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -8,12 +15,9 @@ import numpy.typing as npt
 from ..fluid.balls import Balls
 from ..fluid.errors import InputError
 from ..fluid.field import Field
-from .exact_intervals.crossings import Rays, Spheres, cross, first_crossings, normals
+from .native import load, translated_errors
 
 FloatArray = npt.NDArray[np.float64]
-
-# Distances that are held at once while looking for the pairs of rays and balls that meet.
-_CHUNK = 4_000_000
 
 
 def cast(balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -34,38 +38,55 @@ def cast(balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.Arr
     Raises
     ------
     InputError
-        The arrays have the wrong shape, or a direction is zero or not finite.
+        The arrays have the wrong shape, a number is not finite, or a direction is zero.
+    DeviceError
+        The native core is missing, or there is too little memory.
     """
-    rays = _rays(np.asarray(origins, np.float64), np.asarray(directions, np.float64))
-    radii, weights = balls.radii.astype(np.float64), balls.weights.astype(np.float64)
-    spheres = Spheres(balls.positions.astype(np.float64), radii, weights, field.kernel_radii(radii, weights))
-    t, normal = np.empty(len(rays)), np.empty((len(rays), 3))
-    step = min(4096, max(1, _CHUNK // max(len(balls), 1)))
-    for begin in range(0, len(rays), step):
-        part = slice(begin, begin + step)
-        chunk = Rays(rays.origins[part], rays.directions[part], rays.start[part], rays.end[part])
-        pairs = cross(chunk, spheres, *_candidates(chunk, spheres))
-        t[part] = first_crossings(chunk, spheres, pairs, field)
-        normal[part] = normals(chunk, spheres, pairs, t[part], field)
-    return t, normal
+    with translated_errors():
+        t, normals = load().oracle_cast(*_arguments(balls, field, origins, directions), watch=_let_interrupt)
+    return t, normals
 
 
-def _rays(origins: FloatArray, directions: FloatArray) -> Rays:
-    if origins.ndim != 2 or origins.shape[1] != 3 or directions.shape != origins.shape:
-        raise InputError(f"origins and directions must both have the shape (N, 3), not {origins.shape} and {directions.shape}")
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    if not (np.all(np.isfinite(origins)) and np.all(np.isfinite(length)) and np.all(length > 0)):
-        raise InputError("origins and directions must be finite, and no direction may be zero")
-    return Rays(origins, directions / length, np.zeros(len(origins)), np.full(len(origins), np.inf))
+def crossings(
+    balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.ArrayLike
+) -> tuple[npt.NDArray[np.int64], FloatArray, npt.NDArray[np.bool_]]:
+    """Find all crossings of rays with the isosurface.
+
+    The parameters and the errors are those of :func:`cast`.
+
+    Returns
+    -------
+    rays : (total,) int64
+        Index of the ray of each crossing, ascending.
+    t : (total,) float64
+        Distance along the unit ray, Blender units, greater than 0 and ascending within a ray.
+    is_entering : (total,) bool
+        Whether the ray goes into the fluid there. Within a ray true and false alternate; the first is false where the ray
+        starts inside.
+    """
+    with translated_errors():
+        rays, t, is_entering = load().oracle_crossings(*_arguments(balls, field, origins, directions), watch=_let_interrupt)
+    return rays, t, is_entering
 
 
-def _candidates(rays: Rays, spheres: Spheres) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Pairs of rays and balls that may meet; a superset, found with matrix products."""
-    middle = spheres.centers.mean(axis=0) if len(spheres.centers) else np.zeros(3)
-    centers, origins = spheres.centers - middle, rays.origins - middle
-    along = rays.directions @ centers.T - np.einsum("ij,ij->i", origins, rays.directions)[:, None]
-    squares = np.einsum("ij,ij->i", origins, origins)[:, None] + np.einsum("ij,ij->i", centers, centers)
-    distance_2 = squares - 2 * origins @ centers.T
-    # The products cancel; widen by more than their rounding.
-    ray, ball = np.nonzero(distance_2 - along**2 <= spheres.radii**2 + 1e-12 * (squares + along**2))
-    return ray, ball
+def _arguments(balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Any, ...]:
+    return (
+        balls.positions,
+        balls.radii,
+        balls.weights,
+        field.density_kernel.coefficients,
+        field.isovalue,
+        _vectors("origins", origins),
+        _vectors("directions", directions),
+    )
+
+
+def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
+    try:
+        return np.ascontiguousarray(values, np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be an array of numbers: {error}") from error
+
+
+def _let_interrupt(share_done: float) -> None:
+    """Called now and then while the core works, so that Python sees Ctrl-C."""

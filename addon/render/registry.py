@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from ..fluid.errors import DeviceError, InputError
+from . import native
 from .method import Backend, Method, MethodInfo
 
 _PACKAGE = __package__.rpartition(".addon.")[0]
@@ -15,7 +16,7 @@ _PACKAGE = __package__.rpartition(".addon.")[0]
 # Folders with `params.py` (METHOD, loads nothing heavy) and `method.py` (create()); the preferred first.
 _FOLDERS = (
     "gpu_shaders.methods.depth_peeling",
-    "addon.render.exact_intervals",
+    "addon.render.tile_caster",
 )
 
 
@@ -100,10 +101,11 @@ def runs_in_software_opengl(info: MethodInfo) -> bool:
 
 
 def _problem(info: MethodInfo) -> str:
-    if info.backend == "cpu":
-        return ""
     try:
-        gpu().shared_context().require(info.gl_version)
+        if info.backend == "cpu":
+            native.load()
+        else:
+            gpu().shared_context().require(info.gl_version)
     except DeviceError as error:
         return str(error)
     return ""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -12,19 +11,21 @@ import numpy.typing as npt
 
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
-from ..fluid.errors import CancelledError, DeviceError, InputError
+from ..fluid.errors import CancelledError, DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
-from ..fluid.view_balls import ViewBalls, view_balls
-from .method import Method, MethodInfo, Surface
+from .method import Attribute, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .shading import headlight
 
 Element = TypeVar("Element", np.float32, np.bool_)
 
 BACKENDS = ("auto", "gpu", "cpu")
+
+# What a pass needs beside depth and normal.
+_NEEDED: dict[str, Attribute] = {"combined": "color", "velocity": "velocity", "ball_id": "ball"}
 
 
 def render(
@@ -36,6 +37,8 @@ def render(
     passes: Iterable[str] = ("depth", "normal"),
     look: Look | None = None,
     is_cancelled: Callable[[], bool] | None = None,
+    on_progress: Callable[[float], None] | None = None,
+    threads: int = 0,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -51,6 +54,10 @@ def render(
         Colours of the Combined pass.
     is_cancelled
         Asked again and again while rendering; where it returns True, CancelledError is raised.
+    on_progress
+        Told now and then the share of the present stage that is done, 0 to 1.
+    threads
+        How many threads may work on the CPU; 0 for one a core.
 
     Returns
     -------
@@ -61,22 +68,99 @@ def render(
     InputError, DeviceError, CancelledError
         Each with one sentence for the user.
     """
-    names = checked_passes(passes)
-    info, runner = _pick_method(method, backend)
-    report = RenderInfo(info.name, info.backend, runner.device, dropped=dict(balls.dropped))
-    cropped = camera.cropped()
-    with _timed(report, "view"):
-        seen = view_balls(balls, cropped, field)
-    _check_count(seen, info)
-    with _timed(report, "surface"):
-        surface = runner.find_surface(seen, cropped, field, "combined" in names, _cancel_check(is_cancelled))
-    report.counts = {"balls": len(balls), "balls_drawn": len(seen), **surface.counts}
-    with _timed(report, "passes"):
-        return _image(surface, camera, names, look or Look(), report)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
+    return shot.image(shot.runner.find_surface(shot.request))
 
 
-def _pick_method(method: str, backend: str) -> tuple[MethodInfo, Method]:
-    """The method asked for, or the preferred one that runs here on the back-end asked for.
+def render_progressively(
+    balls: Balls,
+    camera: Camera,
+    field: Field,
+    method: str = "auto",
+    backend: str = "auto",
+    passes: Iterable[str] = ("depth", "normal"),
+    look: Look | None = None,
+    is_cancelled: Callable[[], bool] | None = None,
+    on_progress: Callable[[float], None] | None = None,
+    threads: int = 0,
+) -> Iterator[ImageBuffers]:
+    """Render the surface of a fluid from coarse to fine.
+
+    The parameters and the errors are those of :func:`render`.
+
+    Yields
+    ------
+    ImageBuffers of the whole image, each finer than the one before; the last is what :func:`render` returns. A method that
+    cannot do so yields that one only.
+    """
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
+    if isinstance(shot.runner, ProgressiveMethod):
+        yield from map(shot.image, shot.runner.find_surfaces(shot.request))
+    else:
+        yield shot.image(shot.runner.find_surface(shot.request))
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """One view to be rendered by a method."""
+
+    info: MethodInfo
+    runner: Method
+    request: Request
+    camera: Camera
+    passes: tuple[str, ...]
+    look: Look
+
+    @classmethod
+    def prepare(
+        cls,
+        balls: Balls,
+        camera: Camera,
+        field: Field,
+        method: str,
+        backend: str,
+        passes: Iterable[str],
+        look: Look | None,
+        is_cancelled: Callable[[], bool] | None,
+        on_progress: Callable[[float], None] | None,
+        threads: int,
+    ) -> _Shot:
+        names = checked_passes(passes)
+        if threads < 0:
+            raise InputError(f"The number of threads must be 0 (one a core) or more, not {threads}")
+        attributes = frozenset(_NEEDED[name] for name in names if name in _NEEDED)
+        info, runner = _pick_method(method, backend, attributes)
+        watch = _watch(is_cancelled, on_progress)
+        request = Request(balls, camera.cropped(), field, attributes, threads, watch)
+        return cls(info, runner, request, camera, names, look or Look())
+
+    def image(self, surface: Surface) -> ImageBuffers:
+        """The passes of what the method has found."""
+        balls = self.request.balls
+        report = RenderInfo(self.info.name, self.info.backend, self.runner.device, dropped=dict(balls.dropped))
+        report.milliseconds = dict(surface.milliseconds)
+        report.counts = {"balls": len(balls), **surface.counts}
+        with timed(report.milliseconds, "passes"):
+            hit = surface.hit
+            makers = self._makers(surface, hit)
+            images = {name: _in_whole_image(makers[name](), self.camera, PASSES[name].background) for name in self.passes}
+            return ImageBuffers(self.camera, images, _in_whole_image(hit, self.camera, False), report)
+
+    def _makers(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> dict[str, Callable[[], npt.NDArray[np.float32]]]:
+        """How each pass comes from the surface; all have their background where nothing is hit."""
+        camera = self.request.camera
+        return {
+            "depth": lambda: surface.depth,
+            "normal": lambda: surface.normal,
+            "position": lambda: _positions(surface.depth, hit, camera),
+            "combined": lambda: headlight(surface.normal, camera, surface.color, hit, self.look),
+            "velocity": lambda: _velocities(surface),
+            "ball_id": lambda: _ball_ids(surface, self.request.balls, hit),
+        }
+
+
+def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> tuple[MethodInfo, Method]:
+    """The method asked for, or the preferred one that runs here on the back-end asked for and finds these attributes.
 
     Left to choose, OpenGL is taken where it is hardware: in software it is slower than the CPU back-end.
     """
@@ -86,72 +170,59 @@ def _pick_method(method: str, backend: str) -> tuple[MethodInfo, Method]:
         info, runner = create_method(method)
         if backend not in ("auto", info.backend):
             raise InputError(f"The method '{method}' runs on the back-end '{info.backend}', not on '{backend}'")
+        if missing := _passes_without(attributes - info.attributes):
+            raise InputError(f"The method '{method}' cannot make the pass {missing}; choose another method")
         return info, runner
-    problems = []
+    problems: list[MeniscusError] = []
     for info in method_infos():
         if backend in ("auto", info.backend):
             try:
                 if backend == "auto" and runs_in_software_opengl(info):
                     continue
+                if missing := _passes_without(attributes - info.attributes):
+                    raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
                 return create_method(info.name)
-            except DeviceError as error:
-                problems.append(str(error))
-    raise DeviceError(problems[0])
+            except (DeviceError, InputError) as error:
+                problems.append(error)
+    raise problems[0]
 
 
-def _check_count(balls: ViewBalls, info: MethodInfo) -> None:
-    if len(balls) > info.max_balls:
-        raise InputError(
-            f"{len(balls)} balls meet the view but {info.label} takes at most {info.max_balls}; "
-            "show fewer, or choose another method"
-        )
+def _passes_without(missing: frozenset[Attribute]) -> str:
+    """Names of the passes that need one of the attributes, as text."""
+    return " and ".join(name for name, attribute in _NEEDED.items() if attribute in missing)
 
 
-def _cancel_check(is_cancelled: Callable[[], bool] | None) -> Callable[[], None]:
-    def check() -> None:
+def _watch(is_cancelled: Callable[[], bool] | None, on_progress: Callable[[float], None] | None) -> Callable[[float], None]:
+    def watch(progress: float) -> None:
         if is_cancelled is not None and is_cancelled():
             raise CancelledError("The render was cancelled")
+        if on_progress is not None:
+            on_progress(progress)
 
-    return check
-
-
-@contextmanager
-def _timed(report: RenderInfo, stage: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    report.milliseconds[stage] = (time.perf_counter() - start) * 1e3
-
-
-def _image(surface: Surface, camera: Camera, names: tuple[str, ...], look: Look, report: RenderInfo) -> ImageBuffers:
-    """Derive the passes of the region and put them into the whole image."""
-    hit = np.isfinite(surface.depth)
-    cropped = camera.cropped()
-    makers: dict[str, Callable[[], npt.NDArray[np.float32]]] = {
-        "depth": lambda: surface.depth,
-        "normal": lambda: surface.normal,
-        "position": lambda: _positions(surface.depth, hit, cropped),
-        "combined": lambda: headlight(surface.normal, _world_directions(cropped), surface.color, hit, look),
-    }
-    images = {}
-    for name in names:
-        image = makers[name]()
-        image[~hit] = PASSES[name].background
-        images[name] = _in_whole_image(image, camera, PASSES[name].background)
-    return ImageBuffers(camera, images, _in_whole_image(hit, camera, False), report)
+    return watch
 
 
 def _positions(depth: npt.NDArray[np.float32], hit: npt.NDArray[np.bool_], camera: Camera) -> npt.NDArray[np.float32]:
-    """(height, width, 3) world space; anything where there is no hit."""
+    """(height, width, 3) world space; 0 where there is no hit."""
     origins, directions = camera.view_rays()
     in_view = origins + np.where(hit, depth, 0)[..., None] * directions
-    return np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
+    positions = np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
+    positions[~hit] = 0
+    return positions
 
 
-def _world_directions(camera: Camera) -> npt.NDArray[np.float64]:
-    """(height, width, 3) unit, world space."""
-    _, directions = camera.view_rays()
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    return directions @ camera.world_from_view[:3, :3].T
+def _velocities(surface: Surface) -> npt.NDArray[np.float32]:
+    """(height, width, 3) world space, Blender units a second; 0 where unknown or where there is no hit."""
+    return np.zeros_like(surface.normal) if surface.velocity is None else surface.velocity
+
+
+def _ball_ids(surface: Surface, balls: Balls, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+    """(height, width): ids of the dominant balls, their indices where they have no ids; the background where there is none."""
+    ids = np.full(hit.shape, PASSES["ball_id"].background, np.float32)
+    if surface.ball is not None:
+        indices = surface.ball[hit]
+        ids[hit] = indices if balls.ids is None else balls.ids[indices]
+    return ids
 
 
 def _in_whole_image(image: npt.NDArray[Element], camera: Camera, background: float) -> npt.NDArray[Element]:

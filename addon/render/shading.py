@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ..fluid.camera import Camera
 from ..fluid.look import Look
 
 
 def headlight(
     normal: npt.NDArray[np.float32],
-    direction: npt.NDArray[np.float64],
+    camera: Camera,
     color: npt.NDArray[np.float32] | None,
     hit: npt.NDArray[np.bool_],
     look: Look,
@@ -19,8 +20,10 @@ def headlight(
 
     Parameters
     ----------
-    normal, direction
-        (height, width, 3), unit, both in one space: surface normals and ray directions.
+    normal
+        (height, width, 3), unit, world space, of the camera's whole image.
+    camera
+        Where the light comes from; it has no region.
     color
         (height, width, 3) linear Rec.709, None: the look's colour.
     hit
@@ -30,10 +33,23 @@ def headlight(
     -------
     (height, width, 4) float32: linear Rec.709, premultiplied alpha.
     """
-    facing = np.abs(np.einsum("ijk,ijk->ij", normal, direction))
-    light = look.ambient + (1 - look.ambient) * facing
-    rgba = np.zeros((*hit.shape, 4), np.float32)
-    rgba[..., :3] = light[..., None] * (np.asarray(look.color, np.float32) if color is None else color)
-    rgba[..., 3] = 1
-    rgba[~hit] = 0
+    light = np.abs(_cosines(normal, camera))
+    light *= 1 - look.ambient
+    light += look.ambient
+    light *= hit
+    rgba = np.empty((*hit.shape, 4), np.float32)
+    for channel, value in enumerate(look.color):
+        np.multiply(light, value if color is None else color[..., channel], out=rgba[..., channel])
+    rgba[..., 3] = hit
     return rgba
+
+
+def _cosines(normal: npt.NDArray[np.float32], camera: Camera) -> npt.NDArray[np.float32]:
+    """(height, width): of the angles between normals and rays, negative where the surface faces the eye."""
+    right, up, backward = camera.world_from_view[:3, :3].astype(np.float32).T
+    cosines: npt.NDArray[np.float32] = normal @ -backward
+    if camera.is_perspective:
+        x, y = (centers.astype(np.float32) for centers in camera.pixel_centers())
+        cosines += x * (normal @ right) + y[:, None] * (normal @ up)
+        cosines /= np.sqrt(1 + x**2 + (y**2)[:, None])
+    return cosines

@@ -1,0 +1,116 @@
+"""Hands the fluid and the camera to the native core."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...fluid.camera import Camera
+from ...fluid.passes import DEPTH_BACKGROUND
+from .. import native
+from ..method import Request, Surface, timed
+
+# Every fourth pixel along both axes, then every second, then all.
+_STRIDES = (4, 2, 1)
+
+
+class TileCaster:
+    """See :mod:`tile_caster`."""
+
+    def __init__(self) -> None:
+        self._native = native.load()
+
+    @property
+    def device(self) -> str:
+        """The processor's architecture, and which of its instructions are used."""
+        with native.translated_errors():
+            return f"CPU ({platform.machine()}), {self._native.simd_path()}"
+
+    def find_surface(self, request: Request) -> Surface:
+        """See :meth:`method.Method.find_surface`."""
+        return next(self._surfaces(request, (1,)))
+
+    def find_surfaces(self, request: Request) -> Iterator[Surface]:
+        """See :meth:`method.ProgressiveMethod.find_surfaces`."""
+        return self._surfaces(request, _STRIDES)
+
+    def _surfaces(self, request: Request, strides: tuple[int, ...]) -> Iterator[Surface]:
+        """The surface at every `stride`-th pixel, which also stands for those between, one after the other."""
+        milliseconds: dict[str, float] = {}
+        with native.translated_errors(), timed(milliseconds, "build"):
+            caster = self._caster(request)
+        counts = {"balls_drawn": caster.seen, "tile_entries": caster.tile_entries}
+        for stride in strides:
+            surface = _unfilled(request)
+            with native.translated_errors(), timed(milliseconds, "cast"):
+                self._cast(caster, request, surface, stride)
+            surface.milliseconds, surface.counts = dict(milliseconds), dict(counts)
+            yield surface
+
+    def _caster(self, request: Request) -> Any:
+        balls, field = request.balls, request.field
+        return self._native.TileCaster(
+            balls.positions,
+            balls.radii,
+            balls.weights,
+            field.density_kernel.coefficients,
+            field.isovalue,
+            **_view(request.camera),
+            threads=request.threads,
+            watch=request.watch,
+        )
+
+    def _cast(self, caster: Any, request: Request, surface: Surface, stride: int) -> None:
+        balls = request.balls
+        pairs = ((balls.colors, surface.color), (balls.velocities, surface.velocity))
+        caster.cast(
+            surface.depth,
+            surface.normal,
+            background=DEPTH_BACKGROUND,
+            stride=stride,
+            ball=surface.ball,
+            attributes=[(source, target) for source, target in pairs if source is not None and target is not None],
+            threads=request.threads,
+            watch=request.watch,
+        )
+
+
+def create() -> TileCaster:
+    """The method, ready to run; raises DeviceError where the native core is missing."""
+    return TileCaster()
+
+
+def _view(camera: Camera) -> dict[str, Any]:
+    """The camera as the native core wants it."""
+    right, up, backward = camera.world_from_view[:3, :3].T.tolist()
+    window = camera.window
+    return {
+        "camera_from_world": [right, up, [-number for number in backward]],
+        "eye": camera.eye.tolist(),
+        "window": [window.left, window.right, window.bottom, window.top],
+        "is_perspective": camera.is_perspective,
+        "width": camera.width,
+        "height": camera.height,
+        "clip": [camera.clip_start, camera.clip_end],
+    }
+
+
+def _unfilled(request: Request) -> Surface:
+    """A surface whose every pixel the native core writes."""
+    shape = (request.camera.height, request.camera.width)
+    balls, attributes = request.balls, request.attributes
+
+    def vectors(is_wanted: bool) -> npt.NDArray[np.float32] | None:
+        return np.empty((*shape, 3), np.float32) if is_wanted else None
+
+    return Surface(
+        depth=np.empty(shape, np.float32),
+        normal=np.empty((*shape, 3), np.float32),
+        color=vectors("color" in attributes and balls.colors is not None),
+        velocity=vectors("velocity" in attributes and balls.velocities is not None),
+        ball=np.empty(shape, np.int32) if "ball" in attributes else None,
+    )
