@@ -10,7 +10,7 @@ from cycles_depth import add_spheres, cycles_depth
 RADIUS = 0.4
 
 
-def depth_of_balls(meniscus, centres, method="exact_intervals"):
+def depth_of_balls(meniscus, centres, method="tile_caster"):
     """(height, width): the Depth pass of balls that look like spheres of `RADIUS`, too far apart to blend."""
     field = meniscus.Field("quartic", 0.25)
     balls = meniscus.Balls(centres, RADIUS / np.sqrt(0.5))
@@ -60,7 +60,7 @@ def test_cycles_writes_what_meniscus_writes_where_there_is_nothing(meniscus, emp
     assert set(np.unique(depth[depth > 1e9])) == {np.float32(passes.DEPTH_BACKGROUND)}
 
 
-@pytest.mark.parametrize("method", ["exact_intervals", "depth_peeling"])
+@pytest.mark.parametrize("method", ["tile_caster", "depth_peeling"])
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_depth_agrees_with_cycles(meniscus, empty_scene, tmp_path, kind, method):
     centres = build(empty_scene, kind)

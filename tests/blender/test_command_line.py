@@ -151,6 +151,31 @@ def test_resolution_passes_and_compression_are_the_callers(fluid_scene: bpy.type
     assert attribute(tmp_path / "a.exr", "compression", "compression", 1) == b"\0"
 
 
+@pytest.mark.parametrize(("mode", "threads"), [("FIXED", 3), ("AUTO", 0)])
+def test_the_scenes_threads_are_used(
+    meniscus: ModuleType,
+    fluid_scene: bpy.types.Scene,
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    mode: str,
+    threads: int,
+) -> None:
+    fluid_scene.render.threads_mode = mode
+    if mode == "FIXED":
+        fluid_scene.render.threads = threads
+    module = submodule(meniscus, "blender.render_frames")
+    render, asked = module.render, []
+
+    def recording(*arguments: object, **options: object) -> object:
+        asked.append(options["threads"])
+        return render(*arguments, **options)
+
+    monkeypatch.setattr(module, "render", recording)
+    assert run("render", "--output", str(tmp_path / "fluid.exr"), "--frames", "1").status == 0
+    assert asked == [threads]
+
+
 def test_the_resolution_percentage_counts(fluid_scene: bpy.types.Scene, run: Run, tmp_path: Path) -> None:
     fluid_scene.render.resolution_percentage = 50
     assert run("render", "--output", "//a.exr", "--frames", "1").status == 0

@@ -13,7 +13,7 @@ def _image(meniscus, method):
 
 
 def test_depth_peeling_sees_what_the_exact_method_sees(meniscus):
-    peeled, exact = _image(meniscus, "depth_peeling"), _image(meniscus, "exact_intervals")
+    peeled, exact = _image(meniscus, "depth_peeling"), _image(meniscus, "tile_caster")
     assert 0.1 < exact.hit.mean() < 0.9
     np.testing.assert_array_equal(peeled.hit, exact.hit)
     for name in ("depth", "normal", "combined"):
@@ -28,4 +28,4 @@ def test_rendering_again_and_again_gives_the_same(meniscus):
 
 def test_every_method_says_whether_it_runs_here(meniscus):
     problems = {status.name: status.problem for status in meniscus.methods()}
-    assert problems == {"depth_peeling": "", "exact_intervals": ""}
+    assert problems == {"depth_peeling": "", "tile_caster": ""}

@@ -25,9 +25,13 @@ class Expected:
     radius: np.ndarray
 
 
-def expected(balls: meniscus.Balls, field: meniscus.Field, camera: meniscus.Camera) -> Expected:
-    """Cast the camera's rays from its near clip distance; `radius` is that of the ball that dominates at the hit."""
-    view_origins, view_directions = (array.reshape(-1, 3) for array in camera.view_rays())
+def expected(
+    balls: meniscus.Balls, field: meniscus.Field, camera: meniscus.Camera, pixels: np.ndarray | slice = slice(None)
+) -> Expected:
+    """Cast the camera's rays, or those of some pixels, from its near clip distance; `radius` is that of the ball that
+    dominates at the hit.
+    """
+    view_origins, view_directions = (array.reshape(-1, 3)[pixels] for array in camera.view_rays())
     rotation = camera.world_from_view[:3, :3]
     stretch = np.linalg.norm(view_directions, axis=1)
     directions = view_directions / stretch[:, None] @ rotation.T

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import bernstein
 import moderngl
 import numpy as np
 import pytest
 
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
-from meniscus.addon.render.exact_intervals import bernstein
 from meniscus.gpu_shaders import glsl
 from meniscus.gpu_shaders.glsl import Source
 from meniscus.gpu_shaders.methods.depth_peeling.method import kernel_constants

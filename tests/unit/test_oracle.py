@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import comb
+import _thread
+import signal
+import threading
 
 import numpy as np
 import pytest
@@ -10,7 +12,6 @@ import pytest
 import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.fluid.kernels import KERNELS
-from meniscus.addon.render.exact_intervals import bernstein
 
 ALONG_Y = [[0.0, 1.0, 0.0]]
 
@@ -119,54 +120,80 @@ def test_density_at_the_hit_is_the_isovalue_and_less_before(kernel):
         assert np.all(density(t[hit] * share) < 0.4 + 1e-12)
 
 
-def test_oracle_rejects_unusable_rays():
+def test_crossings_of_one_ball_are_its_front_and_its_back():
+    balls, field = meniscus.Balls([[0, 0, 0]], 1.0), meniscus.Field("quartic", 0.25)
+    origins = [[0, -4, 0], [2, -4, 0], [0, 0, 0], [0.5, -4, 0]]
+    rays, t, is_entering = meniscus.oracle.crossings(balls, field, origins, ALONG_Y * 4)
+    assert (rays.dtype, t.dtype, is_entering.dtype) == (np.int64, np.float64, np.bool_)
+    np.testing.assert_array_equal(rays, [0, 0, 2, 3, 3])
+    np.testing.assert_array_equal(is_entering, [True, False, False, True, False])
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(t, [4 - half, 4 + half, half, 3.5, 4.5], atol=1e-12)
+
+
+def test_a_ball_that_carves_makes_a_hollow():
+    # On the axis x^2 - x^2 (r = 1/2) with 1 - y^2 and 1 - 4 y^2: the hollow's wall is where the difference is T.
+    balls, field = meniscus.Balls([[0, 0, 0]] * 2, [1, 0.5], weights=[1, -1]), meniscus.Field("quartic", 0.5)
+    _, t, is_entering = meniscus.oracle.crossings(balls, field, [[0, -4, 0]], ALONG_Y)
+    front, wall = np.sqrt(1 - np.sqrt(0.5)), np.sqrt((3 - np.sqrt(1.5)) / 15)
+    np.testing.assert_allclose(t - 4, [-front, -wall, wall, front], atol=1e-12)
+    np.testing.assert_array_equal(is_entering, [True, False, True, False])
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_place_is_in_the_fluid_after_an_odd_number_of_crossings_on_the_way(kernel):
+    generator = np.random.default_rng(12)
+    weights = generator.uniform(0.5, 1.5, 40) * generator.choice([1, 1, 1, -1], 40)
+    balls = meniscus.Balls(generator.random((40, 3)), generator.uniform(0.1, 0.4, 40), weights)
+    field = meniscus.Field(kernel, 0.4)
+    places = generator.random((20000, 3)) * 1.4 - 0.2
+    origins = generator.normal(size=(20000, 3)) * 2 + 5
+    rays, t, _ = meniscus.oracle.crossings(balls, field, origins, places - origins)
+    on_the_way = t < np.linalg.norm(places - origins, axis=1)[rays]
+    is_inside = np.bincount(rays[on_the_way], minlength=20000) % 2 == 1
+    x = 1 - ((places[:, None] - balls.positions) ** 2).sum(-1) / balls.radii.astype(float) ** 2
+    excess = (balls.weights * KERNELS[kernel].value(x)).sum(1) - field.isovalue
+    np.testing.assert_array_equal(is_inside, excess > 0)
+    assert 0.02 < is_inside.mean() < 0.98
+
+
+def test_ray_and_ball_arrays_of_any_layout_will_do():
     balls, field = meniscus.Balls([[0, 0, 0]], 1.0), meniscus.Field()
-    with pytest.raises(InputError, match="shape"):
-        meniscus.oracle.cast(balls, field, np.zeros((2, 3)), np.ones((3, 3)))
-    with pytest.raises(InputError, match="no direction may be zero"):
-        meniscus.oracle.cast(balls, field, np.zeros((1, 3)), np.zeros((1, 3)))
+    origins = np.asfortranarray([[0, -4, 0], [0.25, -4, 0]], np.float32)
+    expected = meniscus.oracle.cast(balls, field, [[0, -4, 0], [0.25, -4, 0]], ALONG_Y * 2)[0]
+    np.testing.assert_array_equal(meniscus.oracle.cast(balls, field, origins, np.array(ALONG_Y * 2)[::-1])[0], expected)
+    assert meniscus.oracle.cast(balls, field, np.zeros((0, 3)), np.zeros((0, 3)))[1].shape == (0, 3)
 
 
-def value(p, u):
-    """The definition: the sum of the coefficients times the Bernstein polynomials."""
-    degree = len(p) - 1
-    return sum(comb(degree, k) * u**k * (1 - u) ** (degree - k) * p[k] for k in range(degree + 1))
+@pytest.mark.parametrize("find", [meniscus.oracle.cast, meniscus.oracle.crossings])
+@pytest.mark.parametrize(
+    ("origins", "directions", "sentence"),
+    [
+        (np.zeros((2, 3)), np.ones((3, 3)), "one direction for each of the 2 origins, not 3"),
+        (np.zeros((2, 2)), np.ones((2, 3)), r"origins must be .* of the shape \(N, 3\), not of the shape \(2, 2\)"),
+        (np.zeros(3), np.ones(3), r"origins must be .* of the shape \(N, 3\)"),
+        (np.zeros((1, 3)), np.zeros((1, 3)), "no direction may be zero; that of ray 0"),
+        (np.zeros((2, 3)), [[1, 0, 0], [np.nan, 0, 0]], "directions must be finite.* that of ray 1"),
+        ([[np.inf, 0, 0]], [[1, 0, 0]], "origins must be finite; that of ray 0"),
+        (np.zeros((1, 3)), [["a", "b", "c"]], "directions must be an array of numbers"),
+    ],
+)
+def test_unusable_rays_are_refused_with_a_sentence(find, origins, directions, sentence):
+    with pytest.raises(InputError, match=sentence):
+        find(meniscus.Balls([[0, 0, 0]], 1.0), meniscus.Field(), origins, directions)
 
 
-def test_bernstein_product_and_composition():
-    generator = np.random.default_rng(5)
-    p, q, u = generator.normal(size=(4, 20)), generator.normal(size=(3, 20)), generator.random(20)
-    np.testing.assert_allclose(value(bernstein.product(p, q), u), value(p, u) * value(q, u))
-    x = value(q, u)
-    np.testing.assert_allclose(value(bernstein.compose(KERNELS["wyvill"], q), u), (5 * x**2 + 4 * x**3) / 9)
-
-
-def test_bernstein_restriction():
-    generator = np.random.default_rng(6)
-    p, u = generator.normal(size=(7, 50)), generator.random(50)
-    low, high = np.sort(generator.random((2, 50)), axis=0)
-    np.testing.assert_allclose(value(bernstein.restrict(p, low, high), u), value(p, low + u * (high - low)))
-
-
-def test_bernstein_value_and_slope():
-    generator = np.random.default_rng(7)
-    p, u = generator.normal(size=(7, 50)), generator.uniform(0.1, 0.9, 50)
-    height, slope = bernstein.value_and_slope(p, u)
-    np.testing.assert_allclose(height, value(p, u))
-    np.testing.assert_allclose(slope, (value(p, u + 1e-6) - value(p, u - 1e-6)) / 2e-6, atol=1e-7)
-
-
-def test_first_root_is_the_first_of_several():
-    # (u - 0.2)(u - 0.5)(u - 0.9) rises through zero at 0.2.
-    p = np.ones((1, 1))
-    for root in (0.2, 0.5, 0.9):
-        p = bernstein.product(p, np.array([[-root], [1 - root]]))
-    np.testing.assert_allclose(bernstein.first_root(p), 0.2, atol=1e-13)
-    np.testing.assert_allclose(bernstein.first_root(-p), 0.0)
-
-
-def test_first_root_finds_a_double_root_and_passes_a_near_miss():
-    # (u - 0.3)^2 in Bernstein form is 0.09, -0.21, 0.49.
-    touching = -np.array([[0.09], [-0.21], [0.49]])
-    assert bernstein.first_root(touching)[0] == pytest.approx(0.3, abs=1e-6)
-    assert np.isnan(bernstein.first_root(touching - 1e-9)[0])
+def test_ctrl_c_ends_a_long_cast():
+    # A process that a script starts in the background ignores Ctrl-C until it says otherwise.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Two hundred balls too thin to make a surface: every interval of every ray is looked at, for minutes.
+    positions = np.random.default_rng(13).random((200, 3)) * 0.1
+    balls, field = meniscus.Balls(positions, 1.0, weights=1e-4), meniscus.Field()
+    origins = np.tile([0.0, -4.0, 0.0], (200_000, 1))
+    interrupt = threading.Timer(0.1, _thread.interrupt_main)
+    interrupt.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            meniscus.oracle.cast(balls, field, origins, np.tile(ALONG_Y, (200_000, 1)))
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -79,12 +79,12 @@ def test_region_is_the_same_part_of_the_whole_image():
 def test_info_says_what_happened():
     balls = meniscus.Balls([[0, 0, 0], [np.nan, 0, 0], [500, 0, 0]], 0.5)
     info = render(balls=balls).info
-    assert (info.method, info.backend) == ("exact_intervals", "cpu")
+    assert (info.method, info.backend) == ("tile_caster", "cpu")
     assert "CPU" in info.device
     assert info.counts["balls"] == 2
     assert info.counts["balls_drawn"] == 1
     assert info.dropped == {"position is not finite": 1}
-    assert list(info.milliseconds) == ["view", "surface", "passes"]
+    assert list(info.milliseconds) == ["build", "cast", "passes"]
 
 
 def test_cancelling_stops_the_render():
@@ -116,13 +116,13 @@ def no_opengl(monkeypatch):
     monkeypatch.setattr(method, "create", fail)
 
 
-@pytest.mark.parametrize(("is_software", "expected"), [(True, "exact_intervals"), (False, "depth_peeling")])
+@pytest.mark.parametrize(("is_software", "expected"), [(True, "tile_caster"), (False, "depth_peeling")])
 def test_software_opengl_is_left_alone_unless_asked_for(monkeypatch, is_software, expected):
     stand_in = SimpleNamespace(is_software=is_software)
     monkeypatch.setattr(registry.gpu(), "shared_context", lambda: stand_in)
     monkeypatch.setattr(renderer, "create_method", lambda name: (name, None))
-    assert renderer._pick_method("auto", "auto")[0] == expected
-    assert renderer._pick_method("auto", "gpu")[0] == "depth_peeling"
+    assert renderer._pick_method("auto", "auto", frozenset())[0] == expected
+    assert renderer._pick_method("auto", "gpu", frozenset())[0] == "depth_peeling"
 
 
 def test_without_opengl_the_cpu_does_the_work(no_opengl):
@@ -134,16 +134,7 @@ def test_without_opengl_the_gpu_says_why_not(no_opengl):
         render(backend="gpu")
     problems = {status.name: status.problem for status in meniscus.methods()}
     assert "not available" in problems["depth_peeling"]
-    assert not problems["exact_intervals"]
-
-
-def test_too_many_balls_for_a_method(monkeypatch):
-    from meniscus.addon.render.method import MethodInfo
-
-    info = MethodInfo("small", "Small", "", "cpu", max_balls=1)
-    monkeypatch.setattr(renderer, "_pick_method", lambda *_: (info, registry.create_method("exact_intervals")[1]))
-    with pytest.raises(InputError, match="2 balls meet the view but Small takes at most 1"):
-        render()
+    assert not problems["tile_caster"]
 
 
 def test_unknown_pass_of_an_image_is_named():
@@ -151,13 +142,52 @@ def test_unknown_pass_of_an_image_is_named():
         render(passes=("depth",))["normal"]
 
 
-def test_image_does_not_depend_on_threads_and_bands(monkeypatch):
-    method = registry._import("addon.render.exact_intervals", "method")
+def test_image_does_not_depend_on_threads():
+    whole = render(threads=1)
+    for threads in (0, 3):
+        other = render(threads=threads)
+        for name in ALL_PASSES:
+            np.testing.assert_array_equal(other[name], whole[name])
+        assert other.info.counts == whole.info.counts
+
+
+def test_progressive_images_become_finer_and_end_with_the_whole_one():
     whole = render()
-    monkeypatch.setattr(method, "_PAIRS_PER_BAND", 500)
-    monkeypatch.setattr(method, "_MAX_THREADS", 5)
-    monkeypatch.setattr(method.os, "cpu_count", lambda: 5)
-    in_bands = render()
+    coarse, middle, fine = meniscus.render_progressively(BALLS, CAMERA, meniscus.Field(), backend="cpu", passes=ALL_PASSES)
     for name in ALL_PASSES:
-        np.testing.assert_array_equal(in_bands[name], whole[name])
-    assert in_bands.info.counts == whole.info.counts
+        np.testing.assert_array_equal(fine[name], whole[name])
+    differences = [np.count_nonzero(image["depth"] != whole["depth"]) for image in (coarse, middle, fine)]
+    assert differences[0] > differences[1] > differences[2] == 0
+    # A block of four by four shows its middle pixel.
+    np.testing.assert_allclose(coarse["depth"][2::4, 2::4], whole["depth"][2::4, 2::4], rtol=1e-6)
+    assert np.all(coarse["depth"].reshape(9, 4, 12, 4) == coarse["depth"][::4, ::4][:, None, :, None])
+
+
+def test_velocity_and_ball_are_those_of_the_nearest():
+    balls = meniscus.Balls([[-1, 0, 0], [1, 0, 0]], 0.8, velocities=[[1, 2, 3], [4, 5, 6]], ids=[70, 90])
+    camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=3, width=3, height=3)
+    image = render(camera, balls, passes=("velocity", "ball_id"))
+    np.testing.assert_allclose(image["velocity"][1], [[1, 2, 3], [0, 0, 0], [4, 5, 6]], rtol=1e-6)
+    assert image["ball_id"][1].tolist() == [70, -1, 90]
+    unnamed = meniscus.Balls(balls.positions, balls.radii)
+    image = render(camera, unnamed, passes=("velocity", "ball_id"))
+    assert not image["velocity"].any()
+    assert image["ball_id"][1].tolist() == [0, -1, 1]
+
+
+def test_a_method_says_which_pass_it_cannot_make():
+    with pytest.raises(InputError, match="'depth_peeling' cannot make the pass velocity"):
+        render(backend="auto", method="depth_peeling", passes=("velocity",))
+
+
+def test_progress_rises_to_the_end():
+    random = np.random.default_rng(1)
+    balls = meniscus.Balls(random.random((300_000, 3)), 0.02)
+    shares = []
+    render(CAMERA, balls, on_progress=shares.append)
+    assert all(0 <= share <= 1 for share in shares)
+
+
+def test_a_negative_number_of_threads_is_refused():
+    with pytest.raises(InputError, match="number of threads"):
+        render(threads=-1)

@@ -1,0 +1,25 @@
+"""Writes the balls of one frame of the dam break: python -m bench.save_dam_break FRAME FILE.npz"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from meniscus.samples import dam_break, scene_parts
+from meniscus.samples.one_thread import bpy
+
+
+def main(frame: int, path: str) -> None:
+    scene_parts.new_scene()
+    bpy.ops.wm.open_mainfile(filepath=str(dam_break.baked_file()))
+    bpy.context.scene.frame_set(frame)
+    # Imported here because it loads bpy, which one_thread has to do first.
+    from meniscus.addon.blender.read_scene import read_balls
+
+    balls = read_balls(bpy.context.evaluated_depsgraph_get())
+    np.savez(path, positions=balls.positions, radii=balls.radii, weights=balls.weights)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2])
