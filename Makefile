@@ -4,7 +4,7 @@ VENV := .venv/bin/python
 HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo test test-fast fuzz bench bench-peers lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 14
@@ -12,6 +12,7 @@ help: ## Show this list
 
 setup: ## Make the development environment in .venv, or bring it up to date
 	@$(PYTHON) tools/environments.py development
+	@$(VENV) tools/native_wheels.py
 
 demo: setup ## Bake a dam break, render frames of it headless, write EXR files and pictures to out/demo
 	@$(VENV) -m meniscus.samples.demo
@@ -22,11 +23,20 @@ test: setup ## Run all tests, in every Blender there is (BLENDER=/path adds your
 test-fast: setup ## Run the unit tests and the quick render tests
 	@$(VENV) tools/run_tests.py --fast
 
+fuzz: setup ## Fuzz the native core, each target for SECONDS (60)
+	@$(VENV) tools/native_tests.py --fuzz $(or $(SECONDS),60)
+bench: setup ## Time Meniscus on named scenes (ARGS="--scenes random_1k --repeats 3"); the machine must be idle
+	@PYTHONPATH=tests $(VENV) -m bench.run_bench $(ARGS)
+
+bench-peers: setup ## Time what users have today beside Meniscus, and judge both by the oracle
+	@PYTHONPATH=tests:tools $(VENV) -m bench.run_peers $(ARGS)
+
 lint: setup ## Check style, format, types and the import rules
 	@$(VENV) tools/lint.py
 
-format: setup ## Format the Python files
+format: setup ## Format the Python and Rust files
 	@.venv/bin/ruff check --quiet --fix-only . && .venv/bin/ruff format .
+	@$(VENV) tools/rust.py cargo fmt --all
 
 extension: setup ## Build dist/meniscus-VERSION.zip with Blender's own tool
 	@$(VENV) tools/build_extension.py
@@ -38,4 +48,4 @@ lock: setup ## Pin anew what requirements/*.in ask for, and the wheels in the ma
 	@$(VENV) tools/lock.py
 
 clean: ## Delete what was built and rendered; the environments and downloads stay
-	@rm -rf out dist wheels .pytest_cache .ruff_cache .mypy_cache
+	@rm -rf out dist wheels native/target native/fuzz/target .pytest_cache .ruff_cache .mypy_cache .hypothesis

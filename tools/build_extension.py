@@ -16,9 +16,8 @@ from project import ROOT, ToolError, command_line, output_of, run
 
 def build() -> Path:
     """Build the zip, validate it, and return its path."""
-    wheels = extension_wheels.download()
-    extension_wheels.check_manifest(wheels)
-    place_wheels(wheels)
+    extension_wheels.check_manifest()
+    place_wheels(extension_wheels.collect())
     target = ROOT / "dist" / f"meniscus-{extension_wheels.manifest()['version']}.zip"
     target.parent.mkdir(exist_ok=True)
     packager, tags = blender_packager()

@@ -1,6 +1,7 @@
-"""Makes the Python environments: the development environment in .venv, and one for each bpy wheel in the cache.
+"""Makes the Python environments: the development environment in .venv, and in the cache one for each bpy wheel, one for
+the programs that build the native module, and one for what the benchmark compares with.
 
-    python3 tools/environments.py development | bpy-4.2 | bpy-4.5 | bpy-5.0 | bpy-5.2
+    python3 tools/environments.py development | bpy-4.2 | bpy-4.5 | bpy-5.0 | bpy-5.2 | native-tools | bench-peers
 
 Everything is installed from hash-locked lists (requirements/*.txt) by a pinned uv. Any Python 3 can run this file.
 """
@@ -46,6 +47,9 @@ ENVIRONMENTS = {
     "bpy-4.5": Environment(CACHE / "bpy-4.5", {"3.11": "bpy-4.5.txt"}),
     "bpy-5.0": Environment(CACHE / "bpy-5.0", {"3.11": "bpy-5.0.txt"}),
     "bpy-5.2": Environment(CACHE / "bpy-5.2", {"3.13": "bpy-5.2.txt"}),
+    # maturin, zig and rustup, which build native/.
+    "native-tools": Environment(CACHE / "native-tools", {"3.13": "native-tools.txt", "3.11": "native-tools.txt"}),
+    "bench-peers": Environment(CACHE / "bench-peers", {"3.13": "bench-peers.txt"}),
 }
 
 

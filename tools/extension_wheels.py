@@ -1,6 +1,8 @@
-"""The wheels that travel in the extension: moderngl, glcontext and OpenEXR for every platform and Python it runs on.
+"""The wheels that travel in the extension: moderngl, glcontext and OpenEXR for every platform and Python it runs on, and the
+native core for every platform.
 
-A new platform is a row in `PLATFORMS`, a new Python an entry in `PYTHONS`; `make lock` then rewrites the manifest's list.
+A new platform is a row in `PLATFORMS` and in `native_wheels.TARGETS`, a new Python an entry in `PYTHONS`; `make lock` then
+rewrites the manifest's list.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
+import native_wheels
 import tomllib
 from environments import UV_FOLDER, ensure_uv
 from project import CACHE, REQUIREMENTS, ROOT, ToolError, fingerprint, locked, output_of
@@ -29,8 +32,18 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13", "3.14")
 
 
+def collect() -> list[Path]:
+    """All wheels, downloaded or built where the cache has them not; sorted by name."""
+    return sorted([*download(), *native_wheels.build_all()], key=lambda wheel: wheel.name)
+
+
+def names() -> list[str]:
+    """What `collect` gives, without building anything."""
+    return sorted([*(wheel.name for wheel in download()), *map(native_wheels.wheel_name, PLATFORMS)])
+
+
 def download() -> list[Path]:
-    """All wheels, from the cache where they are there already; sorted by name."""
+    """The wheels of others, from the cache where they are there already."""
     stamp = DOWNLOADS / fingerprint(LOCK, Path(__file__))
     with locked("extension-wheels"):
         if not stamp.is_dir():
@@ -42,7 +55,7 @@ def download() -> list[Path]:
             for wheel in (wheel for folder in folders for wheel in folder.glob("*.whl")):
                 wheel.replace(partial / wheel.name)
             partial.rename(stamp)
-    return sorted(stamp.glob("*.whl"))
+    return list(stamp.glob("*.whl"))
 
 
 def download_for(tags: tuple[str, ...], python: str) -> Path:
@@ -67,16 +80,18 @@ def manifest() -> dict[str, object]:
     return tomllib.loads(MANIFEST.read_text())
 
 
-def check_manifest(wheels: list[Path]) -> None:
-    """Fail where the manifest lists other wheels or platforms than this file and the lock list say."""
+def check_manifest() -> None:
+    """Fail where the manifest lists other wheels or platforms than this file, the lock list and native/ say."""
     listed = manifest()
-    if listed["wheels"] != [f"./wheels/{wheel.name}" for wheel in wheels] or listed["platforms"] != list(PLATFORMS):
-        raise ToolError("The wheels in blender_manifest.toml are not those of requirements/extension.txt: run 'make lock'.")
+    if listed["wheels"] != [f"./wheels/{name}" for name in names()] or listed["platforms"] != list(PLATFORMS):
+        raise ToolError(
+            "The wheels in blender_manifest.toml are not those of requirements/extension.txt and native/: run 'make lock'."
+        )
 
 
-def write_manifest(wheels: list[Path]) -> None:
+def write_manifest() -> None:
     """Bring the manifest's lists of wheels and platforms up to date."""
-    lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
+    lines = "".join(f'  "./wheels/{name}",\n' for name in names())
     text = re.sub(r"^wheels = \[.*?\]", f"wheels = [\n{lines}]", MANIFEST.read_text(), flags=re.MULTILINE | re.DOTALL)
     platforms = ", ".join(f'"{platform}"' for platform in PLATFORMS)
     MANIFEST.write_text(re.sub(r"^platforms = \[.*?\]", f"platforms = [{platforms}]", text, flags=re.MULTILINE))

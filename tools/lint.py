@@ -1,4 +1,4 @@
-"""Checks what can be checked without running: style, format, types, import rules.
+"""Checks what can be checked without running: style, format, types, import rules, in Python and Rust.
 
 .venv/bin/python tools/lint.py
 """
@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import import_rules
+import rust
 from environments import PACKAGES
 from project import ROOT, ToolError, command_line, run
 
@@ -29,6 +30,8 @@ def lint() -> None:
         "types of the package": lambda: check_package_types(programs / "mypy"),
         "types of the tools": lambda: check_tools_types(programs / "mypy"),
         "import rules": lambda: import_rules.main([]),
+        "format of the Rust code": check_rust_format,
+        "Rust code": check_rust,
     }
     failed = [name for name, check in checks.items() if not passes(check)]
     if failed:
@@ -56,6 +59,15 @@ def check_package_types(mypy: Path) -> None:
 def check_tools_types(mypy: Path) -> None:
     tools = ROOT / "tools"
     run([mypy, *MYPY_OPTIONS, *sorted(tools.glob("*.py"))], env={**os.environ, "MYPYPATH": str(tools)}, cwd=tools)
+
+
+def check_rust_format() -> None:
+    run(["cargo", "fmt", "--all", "--check"], env=rust.stable(), cwd=rust.NATIVE)
+
+
+def check_rust() -> None:
+    options = ["--quiet", "--locked", "--all-targets"]
+    run(["cargo", "clippy", *options, "--", "-D", "warnings"], env=rust.stable(), cwd=rust.NATIVE)
 
 
 def main(arguments: list[str]) -> None:

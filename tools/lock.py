@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> None:
         raise ToolError("lock.py takes no arguments")
     for lock, python in locks().items():
         compile_lock(lock, python)
-    extension_wheels.write_manifest(extension_wheels.download())
+    extension_wheels.write_manifest()
 
 
 if __name__ == "__main__":

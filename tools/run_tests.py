@@ -1,10 +1,10 @@
-"""Runs all tests and closes with a summary: lint, unit, render, the extension zip, and tests/blender in every host.
+"""Runs all tests and closes with a summary: lint, unit, render, native, the extension zip, and tests/blender in every host.
 
     .venv/bin/python tools/run_tests.py           all of it
-    .venv/bin/python tools/run_tests.py --fast    unit tests and the quick render tests
+    .venv/bin/python tools/run_tests.py --fast    unit tests, the quick render tests, the native tests on the fastest SIMD path
 
-The hosts are set up in the background while the first suites run. A host that cannot be set up is skipped, loudly; where
-the environment variable CI is set, that is a failure.
+Wheels, toolchains and hosts are made ready in the background while the first suites run. What cannot be made ready is
+skipped, loudly; where the environment variable CI is set, that is a failure.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ import build_extension
 import extension_wheels
 import hosts
 import lint
+import native_tests
+import rust
 from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
@@ -43,10 +45,14 @@ class Result:
 
 def run_all() -> list[Result]:
     ensure_test_programs()
-    with ThreadPoolExecutor(1) as background:
-        wheels = background.submit(extension_wheels.download)
-        ready = {name: background.submit(hosts.prepare, name) for name in hosts.names()}
+    with ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as downloading:
+        compiling.submit(native_tests.compile_tests)
+        nightly = compiling.submit(rust.nightly)
+        wheels = compiling.submit(extension_wheels.collect)
+        ready = {name: downloading.submit(hosts.prepare, name) for name in hosts.names()}
         results = [check("lint", lint.lint), pytest_suite("unit"), pytest_suite("render")]
+        results += [native_suite(name) for name in native_tests.stable_suites()]
+        results += [native_suite(name, nightly) for name in native_tests.NIGHTLY_SUITES]
         results.append(check("extension", lambda: build_after(wheels)))
         results += [host_suite(name, name, setup, hosts.run_suite) for name, setup in ready.items()]
         windows = {name: ready[name] for name in hosts.window_names()}
@@ -55,7 +61,10 @@ def run_all() -> list[Result]:
 
 
 def run_fast() -> list[Result]:
-    return [pytest_suite("unit"), pytest_suite("render", "-m", "not slow")]
+    with ThreadPoolExecutor(1) as compiling:
+        compiling.submit(native_tests.compile_tests)
+        results = [pytest_suite("unit"), pytest_suite("render", "-m", "not slow")]
+    return [*results, native_suite(native_tests.stable_suites()[0])]
 
 
 def build_after(wheels: Future[list[Path]]) -> None:
@@ -88,14 +97,31 @@ def host_suite(name: str, host: str, setup: Future[None], run_suite: Callable[[s
     try:
         setup.result()
     except ToolError as error:
-        print(error, flush=True)
-        return Result(name, problem=str(error).splitlines()[0], is_missing=True)
+        return missing_suite(name, error)
     try:
         status = run_suite(host, ["-q"], report_of(name))
     except ToolError as error:
         print(error, flush=True)
         return Result(name, failed=1, problem=str(error).splitlines()[0])
     return result_of(name, status)
+
+
+def native_suite(name: str, toolchain: Future[dict[str, str]] | None = None) -> Result:
+    """Run tests of native/, once the toolchain is there."""
+    announce(name)
+    try:
+        if toolchain:
+            toolchain.result()
+    except ToolError as error:
+        return missing_suite(name, error)
+    outcome = native_tests.run_suite(name)
+    result = Result(name, outcome.passed, outcome.failed, outcome.skipped)
+    return judged(result, outcome.status if outcome.passed + outcome.failed else outcome.status or NO_TESTS_COLLECTED)
+
+
+def missing_suite(name: str, error: ToolError) -> Result:
+    print(error, flush=True)
+    return Result(name, problem=str(error).splitlines()[0], is_missing=True)
 
 
 def report_of(name: str) -> Path:
@@ -107,7 +133,7 @@ def report_of(name: str) -> Path:
 
 
 def result_of(name: str, status: int) -> Result:
-    """Read the counts from pytest's report; its exit status has the last word."""
+    """Read the counts from pytest's report."""
     result = Result(name)
     report = REPORTS / f"{name}.xml"
     if report.is_file():
@@ -116,6 +142,11 @@ def result_of(name: str, status: int) -> Result:
             result.failed += int(suite.get("failures", 0)) + int(suite.get("errors", 0))
             result.passed += int(suite.get("tests", 0))
         result.passed -= result.failed + result.skipped
+    return judged(result, status)
+
+
+def judged(result: Result, status: int) -> Result:
+    """The result of a suite that ended with this exit status, which has the last word."""
     if status == NO_TESTS_COLLECTED:
         result.problem = "no test was found"
     elif status and not result.failed:

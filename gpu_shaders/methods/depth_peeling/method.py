@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from ....addon.fluid.camera import Camera, Region
+from ....addon.fluid.errors import InputError
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import Kernel
-from ....addon.fluid.view_balls import ViewBalls
-from ....addon.render.method import Surface
+from ....addon.fluid.passes import DEPTH_BACKGROUND
+from ....addon.fluid.view_balls import ViewBalls, view_balls
+from ....addon.render.method import Request, Surface, timed
 from ...context import GpuContext, shared_context
-from .params import METHOD
+from .params import MAX_BALLS, METHOD
 
 _FOLDER = "methods/depth_peeling"
 _BALL_TEXTURE_WIDTH = 4096
@@ -52,20 +54,27 @@ class DepthPeeling:
         """What the driver calls the graphics processor."""
         return str(self._context.renderer)
 
-    def find_surface(
-        self, balls: ViewBalls, camera: Camera, field: Field, wants_color: bool, check_cancelled: Callable[[], None]
-    ) -> Surface:
+    def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""
-        surface = Surface.empty(camera, wants_color and balls.colors is not None)
-        surface.counts = {"peels": 0, "overflows": 0}
-        if len(balls):
-            self._context.run(lambda: self._draw(balls, camera, field, surface, check_cancelled))
+        milliseconds: dict[str, float] = {}
+        with timed(milliseconds, "view"):
+            balls = view_balls(request.balls, request.camera, request.field)
+        if len(balls) > MAX_BALLS:
+            raise InputError(
+                f"{len(balls)} balls meet the view but {METHOD.label} takes at most {MAX_BALLS}; "
+                "show fewer, or choose another method"
+            )
+        surface = _empty(request.camera, "color" in request.attributes and balls.colors is not None)
+        surface.counts = {"balls_drawn": len(balls), "peels": 0, "overflows": 0}
+        with timed(milliseconds, "surface"):
+            if len(balls):
+                self._context.run(lambda: self._draw(balls, request, surface))
+        surface.milliseconds = milliseconds
         return surface
 
-    def _draw(
-        self, balls: ViewBalls, camera: Camera, field: Field, surface: Surface, check_cancelled: Callable[[], None]
-    ) -> None:
+    def _draw(self, balls: ViewBalls, request: Request, surface: Surface) -> None:
         """Fill `surface` band by band; on the context's thread."""
+        camera, field = request.camera, request.field
         colors = balls.colors if surface.color is not None else None
         textures = _ball_textures(self._context.gl, balls, colors)
         constants = {
@@ -76,12 +85,14 @@ class DepthPeeling:
         }
         for band in _bands(camera):
             part = replace(camera, region=band).cropped()
+            check_cancelled = partial(request.watch, band.y_min / camera.height)
             frame = _Frame(self._context, self._targets_for(part), constants, len(balls), check_cancelled)
             frame.bind(textures, _uniforms(balls, part, field))
             counts = frame.peel_all()
             rows = slice(band.y_min, band.y_max)
             normal_depth = frame.read(0)
-            surface.normal[rows], surface.depth[rows] = normal_depth[..., :3], normal_depth[..., 3]
+            surface.normal[rows] = normal_depth[..., :3]
+            surface.depth[rows] = np.minimum(normal_depth[..., 3], DEPTH_BACKGROUND)
             if surface.color is not None:
                 surface.color[rows] = frame.read(1)[..., :3]
             for name, count in counts.items():
@@ -99,6 +110,13 @@ class DepthPeeling:
 def create() -> DepthPeeling:
     """The method on the process's context; raises DeviceError where there is none that can run it."""
     return DepthPeeling(shared_context())
+
+
+def _empty(camera: Camera, with_color: bool) -> Surface:
+    """The surface of nothing, to be filled."""
+    shape = (camera.height, camera.width)
+    color = np.zeros((*shape, 3), np.float32) if with_color else None
+    return Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32), color)
 
 
 def kernel_constants(kernel: Kernel) -> dict[str, object]:

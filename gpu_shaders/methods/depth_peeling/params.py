@@ -10,6 +10,6 @@ METHOD = MethodInfo(
     label="Depth Peeling",
     description="Peels the influence spheres front to back and clips each interval's polynomial (Kanamori et al. 2008)",
     backend="gpu",
+    attributes=frozenset({"color"}),
     gl_version=330,
-    max_balls=MAX_BALLS,
 )
