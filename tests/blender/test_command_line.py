@@ -230,7 +230,7 @@ def test_the_report_tells_about_every_frame(fluid_scene: bpy.types.Scene, run: R
     for frame in report["frames"]:
         assert (frame["balls"], frame["dropped"], frame["backend"], frame["error"]) == (3, {}, "cpu", "")
         assert frame["device"].startswith("CPU")
-        assert {"scene", "read", "surface", "write"} <= set(frame["milliseconds"])
+        assert {"scene", "read", "build", "cast", "passes", "write"} <= set(frame["milliseconds"])
 
 
 def test_a_report_on_the_standard_output_stands_alone_there(fluid_scene: bpy.types.Scene, run: Run) -> None:

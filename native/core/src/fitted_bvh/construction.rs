@@ -276,7 +276,10 @@ fn push_leaf<S: Simd>(simd: S, plan: &Plan, members: &mut Members, leaf: &Cell, 
     }
     let count = tree.ids.len() - first;
     tree.ids.resize(tree.packets.len() * LANES, NO_BALL);
-    tree.nodes.push(Node::new(&leaf.bounds, Kind::Leaf { first, count }));
+    tree.nodes.push(match count {
+        0 => Node::new(&Bounds::EMPTY, Kind::Empty),
+        _ => Node::new(&leaf.bounds, Kind::Leaf { first, count }),
+    });
     Ok(())
 }
 

@@ -308,6 +308,20 @@ fn the_inside_of_a_dense_fluid_is_full() {
 }
 
 #[test]
+fn a_leaf_whose_balls_make_no_surface_is_empty() {
+    let scene = Scene {
+        positions: vec![[0.0; 3]],
+        radii: vec![0.1],
+        weights: vec![-0.1],
+        field: Field::new(kernels()[0].1, 0.03).expect("a field"),
+    };
+    let options = Options { fits: false, tightens: false, proves: false, ..Options::default() };
+    let tree = scene.tree(&options).tree;
+    assert!(tree.ids.is_empty());
+    assert!(tree.nodes.iter().all(|node| node.kind() != Kind::Empty || node.bounds().is_empty()), "{:?}", tree.nodes);
+}
+
+#[test]
 fn threads_build_the_same_tree() {
     let scene = dense_block(40);
     let build = |threads: usize| {
