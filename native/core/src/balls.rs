@@ -2,6 +2,17 @@
 
 use crate::error::{Error, Result};
 
+/// The greatest weight of a ball in single precision, in radii: the squares of the density's slopes must be floats. A ball of a
+/// greater one has its surface where its influence sphere ends, to the last digit, as it has with this.
+const GREATEST_WEIGHT: f32 = 1e15;
+
+/// A ball's weight, bounded for computing in single precision.
+#[inline(always)]
+pub fn bounded_weight(weight: f32, radius: f32) -> f32 {
+    let greatest = GREATEST_WEIGHT * radius;
+    weight.clamp(-greatest, greatest)
+}
+
 /// N metaballs: centres in world space, influence radii R and weights q.
 ///
 /// All slices have the same length; centres are finite, radii finite and greater than 0, weights finite.

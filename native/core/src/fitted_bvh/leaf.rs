@@ -285,10 +285,10 @@ impl<'a, S: Simd> Searcher<'a, S> {
         field.reduce_sum() >= self.density.isovalue
     }
 
-    /// The unit normal that points out of the fluid at a point of the surface, and the index of the ball with the greatest
-    /// share of the field.
+    /// The unit normal that points out of the fluid at a point of the surface, `level` where the field is level there, and the
+    /// index of the ball with the greatest share of the field.
     #[inline(always)]
-    pub fn surface(&self, packets: &[Packet], point: [f64; 3]) -> ([f32; 3], usize) {
+    pub fn surface(&self, packets: &[Packet], point: [f64; 3], level: [f32; 3]) -> ([f32; 3], usize) {
         let simd = self.simd;
         let point = Point::new(simd, point);
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
@@ -311,7 +311,7 @@ impl<'a, S: Simd> Searcher<'a, S> {
         }
         let inward = [pull[0].reduce_sum(), pull[1].reduce_sum(), pull[2].reduce_sum()].map(f64::from);
         let length = inward.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let normal = inward.map(|c| if length > 0.0 { (-c / length) as f32 } else { 0.0 });
+        let normal = if length > 0.0 { inward.map(|c| (-c / length) as f32) } else { level };
         let (shares, packet_of) = (most.lanes().0, strongest.lanes().0);
         let lane = (1..LANES).fold(0, |best, lane| if shares[lane] > shares[best] { lane } else { best });
         (normal, packet_of[lane] as usize * LANES + lane)

@@ -15,7 +15,7 @@ mod split;
 mod traversal;
 mod wide;
 
-use crate::balls::Balls;
+use crate::balls::{Balls, bounded_weight};
 use crate::error::Result;
 use crate::field::Field;
 use crate::job::Job;
@@ -86,11 +86,11 @@ fn leaf_size(node: &Node) -> usize {
 }
 
 fn member(balls: &Balls, index: usize, origin: &[f64; 3]) -> Member {
-    let position = balls.positions()[index];
+    let (position, radius) = (balls.positions()[index], balls.radii()[index]);
     Member {
         center: std::array::from_fn(|axis| (f64::from(position[axis]) - origin[axis]) as f32),
-        radius: balls.radii()[index],
-        weight: balls.weights()[index],
+        radius,
+        weight: bounded_weight(balls.weights()[index], radius),
         id: index as u32,
     }
 }

@@ -80,6 +80,8 @@ struct Entered {
 struct Found {
     distance: f64,
     leaf: usize,
+    /// Whether the segment leaves the fluid there.
+    leaves: bool,
 }
 
 /// Casts rays one after another.
@@ -106,7 +108,8 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
         let found = self.find(&segment, false)?;
         let Kind::Leaf { first, count } = self.bvh.tree.nodes[found.leaf].kind() else { return None };
         let packets = self.bvh.tree.packets_of(first, count);
-        let (normal, index) = self.searcher.surface(packets, segment.at(found.distance));
+        let facing = segment.direction.map(|c| if found.leaves { c } else { -c } as f32);
+        let (normal, index) = self.searcher.surface(packets, segment.at(found.distance), facing);
         Some(Hit { t: segment.t_start + found.distance, normal, ball: self.bvh.tree.ids[first + index] })
     }
 
@@ -141,11 +144,11 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
             }
             let Some(inside) = begins_inside else { continue };
             if any && !inside && self.bvh.tree.nodes[leaf].kind() == Kind::Full {
-                return Some(Found { distance: f64::from(entered.at), leaf });
+                return Some(Found { distance: f64::from(entered.at), leaf, leaves: false });
             }
             if let Some(distance) = self.search(segment, leaf, end, Search { inside, any }) {
                 end = distance;
-                found = Some(Found { distance, leaf });
+                found = Some(Found { distance, leaf, leaves: inside });
                 if any {
                     break;
                 }

@@ -168,7 +168,7 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         while let Some(horizon) = self.next_window(active, &mut stream, &mut state) {
             let found = self.advance(active, &mut state, horizon);
             if found.any() {
-                self.shade(active, found, state.t, surface);
+                self.shade(active, found, &state, surface);
             }
             state.searching = state.searching & !found & state.t.lt(self.simd.load(&self.rays.end));
             if !state.searching.any() {
@@ -434,10 +434,11 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         kinks
     }
 
-    /// Normals, balls and attributes where rays have met the surface.
+    /// Normals, balls and attributes where rays have met the surface. Where the density is level, which has no normal, the one
+    /// that faces along the ray.
     #[inline(always)]
-    fn shade(&self, active: &ActiveBalls, found: S::Mask, t: S::Vector, surface: &mut Surface<'_>) {
-        let simd = self.simd;
+    fn shade(&self, active: &ActiveBalls, found: S::Mask, state: &State<S>, surface: &mut Surface<'_>) {
+        let (simd, t) = (self.simd, state.t);
         let zero = simd.splat(0.0);
         let [dx, dy, dz] = self.rays.direction.each_ref().map(|axis| simd.load(axis));
         let [ox, oy] = self.rays.origin.each_ref().map(|axis| simd.load(axis));
@@ -463,8 +464,10 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
             }
         }
         let length_2 = outward[0].mul_add(outward[0], outward[1].mul_add(outward[1], outward[2] * outward[2]));
-        let scale = (simd.splat(1.0) / length_2.sqrt()).select(zero.lt(length_2), zero);
-        let normal = outward.map(|axis| axis * scale);
+        let scale = simd.splat(1.0) / length_2.sqrt();
+        let is_level = length_2.le(zero);
+        let facing = [dx, dy, dz].map(|axis| zero - axis * state.side);
+        let normal = std::array::from_fn(|axis| facing[axis].select(is_level, outward[axis] * scale));
         let dominant = dominant.lanes();
         let index = |ray| self.entries.index(active.balls[dominant.0[ray] as usize].entry as usize);
         surface.put(simd, found.bits(), point[2], normal, index);

@@ -5,6 +5,7 @@ use super::image::Image;
 use super::occlusion::{CELL, Occlusion, set_bits};
 use super::project::DISTANCE_ERROR;
 use super::view::View;
+use crate::balls::bounded_weight;
 use crate::error::Result;
 use crate::memory::{prefetch, reserve};
 use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
@@ -84,7 +85,7 @@ impl Entries {
             self.entries.push(Entry {
                 center: ball.center,
                 curvature: 1.0 / (ball.radius * ball.radius),
-                weight: ball.weight,
+                weight: bounded_weight(ball.weight, ball.radius),
                 radius: ball.radius,
                 front,
                 back: distance + distance.abs() * (4.0 * DISTANCE_ERROR) + ball.radius,
