@@ -20,7 +20,7 @@ demo: setup ## Bake a dam break, render frames of it headless, write EXR files a
 test: setup ## Run all tests, in every Blender there is (BLENDER=/path adds your own)
 	@$(VENV) tools/run_tests.py
 
-test-fast: setup ## Run the unit tests and the quick render tests
+test-fast: setup ## Run the quick unit, render and native tests
 	@$(VENV) tools/run_tests.py --fast
 
 fuzz: setup ## Fuzz the native core, each target for SECONDS (60)

@@ -1,7 +1,7 @@
 """Runs all tests and closes with a summary: lint, unit, render, native, the extension zip, and tests/blender in every host.
 
     .venv/bin/python tools/run_tests.py           all of it
-    .venv/bin/python tools/run_tests.py --fast    unit tests, the quick render tests, the native tests on the fastest SIMD path
+    .venv/bin/python tools/run_tests.py --fast    the quick unit and render tests, the native tests on the fastest SIMD path
 
 Wheels, toolchains and hosts are made ready in the background while the first suites run. What cannot be made ready is
 skipped, loudly; where the environment variable CI is set, that is a failure.
@@ -63,7 +63,8 @@ def run_all() -> list[Result]:
 def run_fast() -> list[Result]:
     with ThreadPoolExecutor(1) as compiling:
         compiling.submit(native_tests.compile_tests)
-        results = [pytest_suite("unit"), pytest_suite("render", "-m", "not slow")]
+        quick = ("-m", "not slow")
+        results = [pytest_suite("unit", *quick), pytest_suite("render", *quick)]
     return [*results, native_suite(native_tests.stable_suites()[0])]
 
 

@@ -159,6 +159,7 @@ def call(called: Callable[..., Any], *bound: Any, **arguments: Any) -> Any:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", calls())
 @given(data=st.data())
 @settings(**EFFORT, deadline=None, database=None, suppress_health_check=list(HealthCheck))

@@ -48,6 +48,7 @@ def test_two_percent_of_a_block_are_droplets_that_touch_neither_it_nor_its_influ
     assert reach[~inside].min() >= block.SIDE / 2 + balls.radii[0] * (1 - 1e-6)
 
 
+@pytest.mark.slow
 def test_a_block_is_dense_and_its_radius_is_two_spacings():
     balls = block.balls(5000)
     spacing = balls.radii[0] / 2
@@ -187,6 +188,7 @@ def test_an_unusable_number_on_the_command_line_is_named(capsys, value):
     assert f"'{value}' is no whole number greater than 0" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_bake_of_many_particles_is_the_same_in_every_process():
     bake = (
         "import sys, hashlib, numpy\n"
