@@ -2,7 +2,9 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::occlusion::CELL;
 use crate::error::{Error, Result};
+use crate::simd::{LANES, Lanes};
 
 /// The number of no ball.
 pub const NO_BALL: i32 = -1;
@@ -16,9 +18,20 @@ impl<'a> Plane<'a> {
         Self(unsafe { std::slice::from_raw_parts(numbers.as_mut_ptr().cast(), numbers.len()) })
     }
 
+    /// Writes numbers, given as bits, one after the other.
     #[inline(always)]
-    fn put(&self, place: usize, bits: u32) {
-        self.0[place].store(bits, Ordering::Relaxed);
+    fn put<const COUNT: usize>(&self, place: usize, bits: [u32; COUNT]) {
+        for (number, bits) in self.0[place..place + COUNT].iter().zip(bits) {
+            number.store(bits, Ordering::Relaxed);
+        }
+    }
+
+    /// Writes the same number from `place` on.
+    #[inline(always)]
+    fn fill(&self, place: usize, count: usize, bits: u32) {
+        for number in &self.0[place..place + count] {
+            number.store(bits, Ordering::Relaxed);
+        }
     }
 }
 
@@ -99,50 +112,82 @@ impl<'a> Image<'a> {
         self.ball.is_some() || !self.attributes.is_empty()
     }
 
-    /// Writes a square of pixels of side `stride`, as far as it lies in the image.
+    /// Writes a packet's 4 x 4 pixels; `blended` are the attributes.
     #[inline(always)]
-    pub(super) fn put(&self, corner: [usize; 2], stride: usize, depth: f32, normal: [f32; 3], ball: i32) {
-        if stride == 1 {
-            self.put_pixel(corner[1] * self.width + corner[0], depth, normal, ball);
-        } else {
-            self.square(corner, stride).for_each(|pixel| self.put_pixel(pixel, depth, normal, ball));
+    pub(super) fn put_packet(&self, [x, y]: [usize; 2], pixels: &Pixels, blended: &[[Lanes; 3]]) {
+        for row in 0..CELL {
+            let (place, first) = ((y + row) * self.width + x, row * CELL);
+            let depth: [u32; CELL] = std::array::from_fn(|column| pixels.depth.0[first + column].to_bits());
+            self.depth.put(place, depth);
+            self.normal.put(3 * place, interleaved(&pixels.normal, first));
+            for (attribute, vectors) in self.attributes.iter().zip(blended) {
+                attribute.target.put(3 * place, interleaved(vectors, first));
+            }
+            if let Some(balls) = &self.ball {
+                let ball: [u32; CELL] = std::array::from_fn(|column| pixels.ball[first + column] as u32);
+                balls.put(place, ball);
+            }
         }
     }
 
-    #[inline(always)]
-    fn put_pixel(&self, pixel: usize, depth: f32, normal: [f32; 3], ball: i32) {
-        self.depth.put(pixel, depth.to_bits());
-        for (channel, number) in normal.into_iter().enumerate() {
-            self.normal.put(3 * pixel + channel, number.to_bits());
-        }
-        if let Some(balls) = &self.ball {
-            balls.put(pixel, ball as u32);
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn put_attribute(&self, number: usize, corner: [usize; 2], stride: usize, values: [f32; 3]) {
-        for pixel in self.square(corner, stride) {
-            for (channel, value) in values.into_iter().enumerate() {
-                self.attributes[number].target.put(3 * pixel + channel, value.to_bits());
+    /// Writes a square of pixels of side `side`, as far as it lies in the image; they are all like one of a packet.
+    pub(super) fn put_square(&self, corner: [usize; 2], side: usize, pixels: &Pixels, blended: &[[Lanes; 3]], pixel: usize) {
+        let bits = |vectors: &[Lanes; 3]| vectors.each_ref().map(|axis| axis.0[pixel].to_bits());
+        for (place, count) in self.rows(corner, side) {
+            self.depth.fill(place, count, pixels.depth.0[pixel].to_bits());
+            for place in place..place + count {
+                self.normal.put(3 * place, bits(&pixels.normal));
+                for (attribute, vectors) in self.attributes.iter().zip(blended) {
+                    attribute.target.put(3 * place, bits(vectors));
+                }
+            }
+            if let Some(balls) = &self.ball {
+                balls.fill(place, count, pixels.ball[pixel] as u32);
             }
         }
     }
 
     /// Writes that there is nothing in a square of pixels of side `side`, as far as it lies in the image.
-    #[inline(always)]
     pub(super) fn put_background(&self, corner: [usize; 2], side: usize) {
-        self.put(corner, side, self.background, [0.0; 3], NO_BALL);
-        for number in 0..self.attributes.len() {
-            self.put_attribute(number, corner, side, [0.0; 3]);
+        for (place, count) in self.rows(corner, side) {
+            self.depth.fill(place, count, self.background.to_bits());
+            self.normal.fill(3 * place, 3 * count, 0);
+            if let Some(balls) = &self.ball {
+                balls.fill(place, count, NO_BALL as u32);
+            }
+            for attribute in &self.attributes {
+                attribute.target.fill(3 * place, 3 * count, 0);
+            }
         }
     }
 
-    #[inline(always)]
-    fn square(&self, [x, y]: [usize; 2], stride: usize) -> impl Iterator<Item = usize> {
-        let columns = x..(x + stride).min(self.width);
-        (y..(y + stride).min(self.height)).flat_map(move |row| columns.clone().map(move |column| row * self.width + column))
+    /// The first pixel of each row of a square, and how many of the row lie in the image.
+    fn rows(&self, [x, y]: [usize; 2], side: usize) -> impl Iterator<Item = (usize, usize)> {
+        let (width, count) = (self.width, side.min(self.width - x));
+        (y..(y + side).min(self.height)).map(move |row| (row * width + x, count))
     }
+}
+
+/// What a packet's pixels show.
+pub struct Pixels {
+    pub depth: Lanes,
+    pub normal: [Lanes; 3],
+    pub ball: [i32; LANES],
+}
+
+impl Pixels {
+    /// Pixels that show nothing.
+    #[inline(always)]
+    pub fn background(image: &Image) -> Self {
+        let zero = Lanes::splat(0.0);
+        Self { depth: Lanes::splat(image.background), normal: [zero; 3], ball: [NO_BALL; LANES] }
+    }
+}
+
+/// Bits of the vectors of a packet's four pixels from `first` on, one vector after the other.
+#[inline(always)]
+fn interleaved(vectors: &[Lanes; 3], first: usize) -> [u32; 3 * CELL] {
+    std::array::from_fn(|number| vectors[number % 3].0[first + number / 3].to_bits())
 }
 
 fn check(name: &str, found: usize, wanted: usize) -> Result<()> {

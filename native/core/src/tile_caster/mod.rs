@@ -20,7 +20,7 @@ pub use self::image::{Attribute, Image, NO_BALL};
 use self::occlusion::{CELL, CHUNK, Occlusion};
 use self::packet::{ActiveBalls, Thresholds, Walk};
 use self::polynomial::Polynomial;
-use self::tile::{Entries, PacketPixels, PixelCenters, Rays, Shares, Surface};
+use self::tile::{Blends, Entries, PacketPixels, PixelCenters, Rays, Surface};
 pub use self::view::View;
 use crate::balls::Balls;
 use crate::error::{Error, Result};
@@ -113,7 +113,7 @@ impl TileCaster {
 struct Scratch {
     entries: Entries,
     active: ActiveBalls,
-    shares: Shares,
+    blends: Blends,
 }
 
 /// Casts the rays of a tile.
@@ -157,7 +157,7 @@ impl TileTask<'_> {
             for x in (left..end[0]).step_by(CELL * self.stride) {
                 let pixels = PacketPixels { x, y, stride: self.stride };
                 let rays = Rays::new(simd, &caster.view, &caster.centers, &caster.occlusion, pixels, end);
-                let mut surface = Surface::new(self.image, &caster.view, pixels, rays.lanes, &mut self.scratch.shares);
+                let mut surface = Surface::new(self.image, &caster.view, pixels, rays.lanes, &mut self.scratch.blends);
                 let mut walk = Walk {
                     simd,
                     kernel,

@@ -470,7 +470,7 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         let normal = std::array::from_fn(|axis| facing[axis].select(is_level, outward[axis] * scale));
         let dominant = dominant.lanes();
         let index = |ray| self.entries.index(active.balls[dominant.0[ray] as usize].entry as usize);
-        surface.put(simd, found.bits(), point[2], normal, index);
+        surface.put(simd, found, point[2], normal, index);
     }
 }
 

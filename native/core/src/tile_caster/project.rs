@@ -60,21 +60,17 @@ impl Projector {
     /// Projects the balls from `first` on, at most sixteen; lanes beyond the last repeat it.
     #[inline(always)]
     pub fn project<S: Simd>(&self, simd: S, balls: &Balls<'_>, first: usize) -> Projected {
-        let last = balls.len() - 1;
-        let index = |lane: usize| (first + lane).min(last);
-        let radius = Lanes(std::array::from_fn(|lane| balls.radii()[index(lane)]));
-        // In double precision: only the subtraction of the eye makes coordinates small.
-        let mut world = [[0.0f64; LANES]; 3];
-        for (axis, numbers) in world.iter_mut().enumerate() {
-            for (lane, number) in numbers.iter_mut().enumerate() {
-                *number = f64::from(balls.positions()[index(lane)][axis]) - self.eye[axis];
+        let (positions, radius) = sixteen(balls, first);
+        // In double precision: only the subtraction of the eye makes coordinates small. In plain loops, which compilers turn
+        // into vectors with the path's instructions; in a closure they would not have them.
+        let mut center = [Lanes::splat(0.0); 3];
+        for (axis, row) in self.rows.iter().enumerate() {
+            for lane in 0..LANES {
+                let [x, y, z] = positions[lane];
+                let (x, y, z) = (f64::from(x) - self.eye[0], f64::from(y) - self.eye[1], f64::from(z) - self.eye[2]);
+                center[axis].0[lane] = (row[0] * x + row[1] * y + row[2] * z) as f32;
             }
         }
-        let [x, y, z] = world;
-        let center = self.rows.map(|row| {
-            let turned = |lane: usize| (row[0] * x[lane] + row[1] * y[lane] + row[2] * z[lane]) as f32;
-            Lanes(std::array::from_fn(turned))
-        });
         let [x, y, depth] = center.each_ref().map(|lanes| simd.load(lanes));
         let distance = if self.is_perspective { x.mul_add(x, y.mul_add(y, depth * depth)).sqrt() } else { depth };
         Projected { center, radius, distance: distance.lanes() }
@@ -125,6 +121,21 @@ impl Projector {
         let last = ((high - origin) * scale - half + margin).floor().min(size - simd.splat(1.0));
         (first.min(size), last.max(zero - simd.splat(1.0)))
     }
+}
+
+/// Positions and radii of sixteen balls from `first` on; beyond the last it is repeated.
+#[inline(always)]
+fn sixteen(balls: &Balls<'_>, first: usize) -> ([[f32; 3]; LANES], Lanes) {
+    if let (Some(positions), Some(radii)) = (balls.positions()[first..].first_chunk(), balls.radii()[first..].first_chunk()) {
+        return (*positions, Lanes(*radii));
+    }
+    let last = balls.len() - 1;
+    let (mut positions, mut radii) = ([[0.0; 3]; LANES], Lanes::splat(0.0));
+    for lane in 0..LANES {
+        let index = (first + lane).min(last);
+        (positions[lane], radii.0[lane]) = (balls.positions()[index], balls.radii()[index]);
+    }
+    (positions, radii)
 }
 
 /// The lowest `count` bits of sixteen.

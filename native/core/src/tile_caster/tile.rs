@@ -1,7 +1,7 @@
 //! A tile of the image: its balls in the order in which they begin, its packets of rays, and where results go.
 
 use super::bins::{Bins, front_of_entry};
-use super::image::Image;
+use super::image::{Image, Pixels};
 use super::occlusion::{CELL, Occlusion, set_bits};
 use super::project::DISTANCE_ERROR;
 use super::view::View;
@@ -231,6 +231,20 @@ impl PacketPixels {
         [x + self.stride / 2, y + self.stride / 2]
     }
 
+    /// A bit for each ray whose pixels begin left of `right` and below `top`.
+    #[inline(always)]
+    fn lanes_before(&self, [right, top]: [usize; 2]) -> u16 {
+        let side = CELL * self.stride;
+        if self.x + side <= right && self.y + side <= top {
+            return u16::MAX;
+        }
+        let is_before = |ray: usize| {
+            let [x, y] = self.corner(ray);
+            x < right && y < top
+        };
+        (0..LANES).fold(0, |lanes, ray| lanes | u16::from(is_before(ray)) << ray)
+    }
+
     /// The lower left of the pixels that a ray stands for.
     #[inline(always)]
     pub fn corner(&self, ray: usize) -> [usize; 2] {
@@ -250,14 +264,12 @@ impl Rays {
         [right, top]: [usize; 2],
     ) -> Self {
         let (mut across, mut up) = (Lanes::splat(0.0), Lanes::splat(0.0));
-        let mut lanes = 0;
         for ray in 0..LANES {
             let [x, y] = pixels.pixel(ray);
             across.0[ray] = centers.columns[x];
             up.0[ray] = centers.rows[y];
-            let [x, y] = pixels.corner(ray);
-            lanes |= u16::from(x < right && y < top) << ray;
         }
+        let lanes = pixels.lanes_before([right, top]);
         let (zero, one) = (Lanes::splat(0.0), Lanes::splat(1.0));
         let (direction, origin, stretch) = if view.is_perspective {
             let (x, y) = (simd.load(&across), simd.load(&up));
@@ -299,22 +311,39 @@ pub struct Surface<'a> {
     image: &'a Image<'a>,
     /// Rows: right, up and forward in world space.
     camera_from_world: [[f32; 3]; 3],
-    pixels: PacketPixels,
-    missing: u16,
-    shares: &'a mut Shares,
+    place: PacketPixels,
+    /// The rays whose pixels are in the image.
+    lanes: u16,
+    pixels: Pixels,
+    /// Sum of the balls' shares of the density.
+    total: Lanes,
+    blends: &'a mut Blends,
 }
 
-/// Sums of the attributes, weighted by the balls' shares of the density.
+/// The attributes of a packet's pixels.
 #[derive(Default)]
-pub struct Shares {
-    total: Vec<Lanes>,
+pub struct Blends {
+    /// Weighted by the balls' shares of the density.
     sums: Vec<[Lanes; 3]>,
+    values: Vec<[Lanes; 3]>,
+}
+
+impl Blends {
+    fn clear(&mut self, count: usize) {
+        for vectors in [&mut self.sums, &mut self.values] {
+            vectors.clear();
+            vectors.resize(count, [Lanes::splat(0.0); 3]);
+        }
+    }
 }
 
 impl<'a> Surface<'a> {
-    pub fn new(image: &'a Image<'a>, view: &View, pixels: PacketPixels, lanes: u16, shares: &'a mut Shares) -> Self {
+    #[inline(always)]
+    pub fn new(image: &'a Image<'a>, view: &View, place: PacketPixels, lanes: u16, blends: &'a mut Blends) -> Self {
         let camera_from_world = view.camera_from_world.map(|row| row.map(|number| number as f32));
-        Self { image, camera_from_world, pixels, missing: lanes, shares }
+        blends.clear(image.attributes().len());
+        let (pixels, total) = (Pixels::background(image), Lanes::splat(0.0));
+        Self { image, camera_from_world, place, lanes, pixels, total, blends }
     }
 
     /// Whether the balls' shares of the density matter.
@@ -323,18 +352,15 @@ impl<'a> Surface<'a> {
     }
 
     pub fn begin_shares(&mut self) {
-        self.shares.total.clear();
-        self.shares.total.push(Lanes::splat(0.0));
-        self.shares.sums.clear();
-        self.shares.sums.resize(self.image.attributes().len(), [Lanes::splat(0.0); 3]);
+        self.total = Lanes::splat(0.0);
+        self.blends.sums.fill([Lanes::splat(0.0); 3]);
     }
 
     /// Adds what a ball gives to the attributes of every ray.
     #[inline(always)]
     pub fn add_share<S: Simd>(&mut self, simd: S, index: u32, share: S::Vector) {
-        let total = &mut self.shares.total[0];
-        (simd.load(total) + share).store(total);
-        for (sum, attribute) in self.shares.sums.iter_mut().zip(self.image.attributes()) {
+        (simd.load(&self.total) + share).store(&mut self.total);
+        for (sum, attribute) in self.blends.sums.iter_mut().zip(self.image.attributes()) {
             let values = attribute.values(index);
             for (channel, value) in sum.iter_mut().zip(values) {
                 share.mul_add(simd.splat(value), simd.load(channel)).store(channel);
@@ -342,34 +368,45 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Writes the pixels whose bits are set in `found`; normals are in camera space, `ball` gives a ray's dominant ball.
+    /// Takes in the rays that are `found`; normals are in camera space, `ball` gives a ray's dominant ball.
     #[inline(always)]
-    pub fn put<S: Simd>(&mut self, simd: S, found: u16, depth: S::Vector, normal: [S::Vector; 3], ball: impl Fn(usize) -> u32) {
-        let depth = depth.lanes();
-        let turned = |axis: usize| {
-            let [right, up, forward] = std::array::from_fn(|row| simd.splat(self.camera_from_world[row][axis]));
-            normal[0].mul_add(right, normal[1].mul_add(up, normal[2] * forward)).lanes()
-        };
-        let normal: [Lanes; 3] = std::array::from_fn(turned);
-        for ray in set_bits(found) {
-            let corner = self.pixels.corner(ray);
-            let normal = normal.each_ref().map(|axis| axis.0[ray]);
-            self.image.put(corner, self.pixels.stride, depth.0[ray], normal, ball(ray) as i32);
-            let total = self.shares.total[0].0[ray];
-            let share = if total > 0.0 { 1.0 / total } else { 0.0 };
-            for (number, sums) in self.shares.sums.iter().enumerate() {
-                let values = sums.each_ref().map(|sum| sum.0[ray] * share);
-                self.image.put_attribute(number, corner, self.pixels.stride, values);
+    pub fn put<S: Simd>(
+        &mut self,
+        simd: S,
+        found: S::Mask,
+        depth: S::Vector,
+        normal: [S::Vector; 3],
+        ball: impl Fn(usize) -> u32,
+    ) {
+        let (zero, pixels) = (simd.splat(0.0), &mut self.pixels);
+        depth.select(found, simd.load(&pixels.depth)).store(&mut pixels.depth);
+        for (axis, lanes) in pixels.normal.iter_mut().enumerate() {
+            let [right, up, forward] = self.camera_from_world.map(|row| simd.splat(row[axis]));
+            let turned = normal[0].mul_add(right, normal[1].mul_add(up, normal[2] * forward));
+            turned.select(found, simd.load(lanes)).store(lanes);
+        }
+        if !self.image.wants_shares() {
+            return;
+        }
+        set_bits(found.bits()).for_each(|ray| pixels.ball[ray] = ball(ray) as i32);
+        let total = simd.load(&self.total);
+        let share = (simd.splat(1.0) / total).select(zero.lt(total), zero);
+        for (values, sums) in self.blends.values.iter_mut().zip(&self.blends.sums) {
+            for (value, sum) in values.iter_mut().zip(sums) {
+                (simd.load(sum) * share).select(found, simd.load(value)).store(value);
             }
         }
-        self.missing &= !found;
     }
 
-    /// Writes the background where nothing has been found.
+    /// Writes the packet's pixels.
     #[inline(always)]
     pub fn finish(self) {
-        for lane in set_bits(self.missing) {
-            self.image.put_background(self.pixels.corner(lane), self.pixels.stride);
+        if self.place.stride == 1 && self.lanes == u16::MAX {
+            self.image.put_packet([self.place.x, self.place.y], &self.pixels, &self.blends.values);
+        } else {
+            for lane in set_bits(self.lanes) {
+                self.image.put_square(self.place.corner(lane), self.place.stride, &self.pixels, &self.blends.values, lane);
+            }
         }
     }
 }
