@@ -1,10 +1,14 @@
 //! The metaballs, borrowed from their owner.
 
 use crate::error::{Error, Result};
+use crate::simd::LANES;
 
 /// The greatest weight of a ball in single precision, in radii: the squares of the density's slopes must be floats. A ball of a
 /// greater one has its surface where its influence sphere ends, to the last digit, as it has with this.
 const GREATEST_WEIGHT: f32 = 1e15;
+
+/// Numbers that are looked at together.
+const STRETCH: usize = 256;
 
 /// A ball's weight, bounded for computing in single precision.
 #[inline(always)]
@@ -40,10 +44,20 @@ impl<'a> Balls<'a> {
         if count > i32::MAX as usize {
             return Err(Error::InvalidInput(format!("{count} balls are more than the {} that can be numbered", i32::MAX)));
         }
-        check(positions.iter().all(|p| p[0].is_finite() & p[1].is_finite() & p[2].is_finite()), "positions", "finite")?;
-        check(radii.iter().all(|r| r.is_finite() & (*r > 0.0)), "radii", "finite and greater than zero")?;
-        check(weights.iter().all(|w| w.is_finite()), "weights", "finite")?;
+        check(all(positions.as_flattened(), f32::is_finite), "positions", "finite")?;
+        check(all(radii, |radius| radius.is_finite() & (radius > 0.0)), "radii", "finite and greater than zero")?;
+        check(all(weights, f32::is_finite), "weights", "finite")?;
         Ok(Self { positions, radii, weights })
+    }
+
+    /// The greatest weight, 0 where there is none above.
+    pub fn greatest_weight(&self) -> f32 {
+        let greater = |a: f32, b: f32| if a > b { a } else { b };
+        let mut lanes = [0.0; LANES];
+        for weights in self.weights.chunks(LANES) {
+            lanes.iter_mut().zip(weights).for_each(|(lane, weight)| *lane = greater(*weight, *lane));
+        }
+        lanes.into_iter().fold(0.0, greater)
     }
 
     /// How many there are.
@@ -70,6 +84,11 @@ impl<'a> Balls<'a> {
     pub fn weights(&self) -> &'a [f32] {
         self.weights
     }
+}
+
+/// Whether all numbers pass a test; they are looked at in stretches, for which compilers use vectors.
+fn all(numbers: &[f32], test: impl Fn(f32) -> bool) -> bool {
+    numbers.chunks(STRETCH).all(|stretch| stretch.iter().fold(true, |passes, number| passes & test(*number)))
 }
 
 fn check(holds: bool, name: &str, wanted: &str) -> Result<()> {

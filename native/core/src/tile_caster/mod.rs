@@ -52,8 +52,7 @@ impl TileCaster {
         view.check()?;
         job.expect(3 * balls.len().div_ceil(CHUNK));
         let occlusion = Occlusion::new(path, balls, field, view, job)?;
-        let greatest = balls.weights().iter().fold(0.0f32, |greatest, weight| greatest.max(*weight));
-        let thresholds = Thresholds::new(field, greatest);
+        let thresholds = Thresholds::new(field, balls.greatest_weight());
         let bins = Bins::new(path, balls, view, &occlusion, job)?;
         Ok(Self {
             path,

@@ -1,6 +1,7 @@
 //! Kernel-sphere occlusion culling (Kanamori et al. 2008, section 5.2) with a coarse depth buffer: for each cell of pixels, a
 //! distance at which every one of its rays has surely met the surface. What begins farther away cannot be seen.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rayon::prelude::*;
@@ -98,11 +99,17 @@ impl KernelRadii {
         Self { isovalue: field.isovalue as f32, table: std::array::from_fn(share) }
     }
 
-    /// 0 where a ball of this weight has no surface alone.
+    /// 0 where a ball of such a weight has no surface alone.
     #[inline(always)]
-    fn share(&self, weight: f32) -> f32 {
-        let part = self.isovalue / weight * TABLE_SIZE as f32;
-        if weight > 0.0 && part < TABLE_SIZE as f32 { self.table[part as usize] } else { 0.0 }
+    fn shares<S: Simd>(&self, simd: S, weights: &Lanes) -> S::Vector {
+        let (zero, size, weight) = (simd.splat(0.0), simd.splat(TABLE_SIZE as f32), simd.load(weights));
+        let part = (simd.splat(self.isovalue) / weight * size).select(zero.lt(weight), size).min(size);
+        let parts = whole_numbers(simd, part.floor());
+        let mut shares = Lanes::splat(0.0);
+        for (share, part) in shares.0.iter_mut().zip(parts) {
+            *share = self.table[part.min(TABLE_SIZE)];
+        }
+        simd.load(&shares)
     }
 }
 
@@ -186,8 +193,8 @@ impl Pass<'_> {
     /// Draws those kernel spheres that are large enough to cover the pixels of a cell, and not hidden by others.
     #[inline(always)]
     fn draw<S: Simd>(&self, simd: S, balls: &Projected, weights: &Lanes, counted: u16) {
-        let kernel_radii = Lanes(std::array::from_fn(|lane| balls.radius.0[lane] * self.kernel_radii.share(weights.0[lane])));
-        let (kernel_radius, depth) = (simd.load(&kernel_radii), simd.load(&balls.center[2]));
+        let kernel_radius = simd.load(&balls.radius) * self.kernel_radii.shares(simd, weights);
+        let depth = simd.load(&balls.center[2]);
         // World units for each unit of the window at the balls' depth.
         let unit = if self.view.is_perspective { depth } else { simd.splat(1.0) };
         // Between the centres of a cell's outermost pixels.
@@ -199,31 +206,57 @@ impl Pass<'_> {
             return;
         }
         let distance = simd.load(&balls.distance) * simd.splat(1.0 + DISTANCE_ERROR);
+        let across = self.spans(simd, balls, 0, unit, kernel_radius);
+        let up = self.spans(simd, balls, 1, unit, kernel_radius);
+        let is_somewhere = across.first.lt(across.end) & up.first.lt(up.end);
         let spheres = KernelSpheres {
-            middle: std::array::from_fn(|axis| {
-                let from_edge = simd.load(&balls.center[axis]) / unit - simd.splat(self.view.window[2 * axis] as f32);
-                (from_edge / simd.splat(self.pixel_size[axis])).lanes()
-            }),
-            pixel: self.pixel_size.map(|size| (unit * simd.splat(size)).lanes()),
+            across: across.stored(),
+            up: up.stored(),
             distance: distance.lanes(),
-            front: (distance - kernel_radius).lanes(),
-            radius: kernel_radii,
+            radius: kernel_radius.lanes(),
         };
-        for lane in set_bits(drawn & self.not_hidden(simd, &spheres)) {
-            self.draw_one(&spheres, lane);
+        let is_before = (distance - kernel_radius).lt(self.known_at(simd, across.cell, up.cell));
+        for lane in set_bits(drawn & (is_somewhere & is_before).bits()) {
+            self.draw_one(simd, &spheres, lane);
         }
     }
 
-    /// A bit for each kernel sphere that begins before what is known of its middle cell; the others would change little.
+    /// The cells along an axis that kernel spheres may cover.
     #[inline(always)]
-    fn not_hidden<S: Simd>(&self, simd: S, spheres: &KernelSpheres) -> u16 {
-        let cell = |axis: usize, count: usize| {
-            let place = simd.load(&spheres.middle[axis]) * simd.splat(1.0 / CELL as f32);
-            place.max(simd.splat(0.0)).min(simd.splat((count - 1) as f32)).floor()
-        };
-        let cells = whole_numbers(simd, cell(1, self.rows).mul_add(simd.splat(self.columns as f32), cell(0, self.columns)));
-        let known = Lanes(cells.map(|cell| self.known.get(cell).copied().unwrap_or(f32::INFINITY)));
-        simd.load(&spheres.front).lt(simd.load(&known)).bits()
+    fn spans<S: Simd>(
+        &self,
+        simd: S,
+        balls: &Projected,
+        axis: usize,
+        unit: S::Vector,
+        kernel_radius: S::Vector,
+    ) -> Spans<S::Vector> {
+        let (zero, half, per_cell) = (simd.splat(0.0), simd.splat(0.5), simd.splat(1.0 / CELL as f32));
+        let count = simd.splat([self.columns, self.rows][axis] as f32);
+        let pixel = unit * simd.splat(self.pixel_size[axis]);
+        let from_edge = simd.load(&balls.center[axis]) - simd.splat(self.view.window[2 * axis] as f32) * unit;
+        let (middle, radius) = (from_edge / pixel, kernel_radius / pixel);
+        Spans {
+            middle,
+            pixel,
+            cell: (middle * per_cell).floor().max(zero).min(count - simd.splat(1.0)),
+            // Where this is whole, a cell is left out, which only hides less.
+            first: ((middle - radius - half) * per_cell + simd.splat(1.0)).floor().max(zero),
+            end: ((middle + radius + half) * per_cell).floor().max(zero).min(count),
+        }
+    }
+
+    /// What is known of cells; kernel spheres that begin behind what is known of their middle cell would change little.
+    #[inline(always)]
+    fn known_at<S: Simd>(&self, simd: S, column: S::Vector, row: S::Vector) -> S::Vector {
+        let mut known = Lanes::splat(f32::INFINITY);
+        if !self.known.is_empty() {
+            let cells = whole_numbers(simd, row.mul_add(simd.splat(self.columns as f32), column));
+            for (known, cell) in known.0.iter_mut().zip(cells) {
+                *known = self.known.get(cell).copied().unwrap_or(f32::INFINITY);
+            }
+        }
+        simd.load(&known)
     }
 
     /// Lowers the distances of the cells whose every ray meets the kernel sphere.
@@ -231,21 +264,23 @@ impl Pass<'_> {
     /// A ray that passes the centre at the perpendicular distance p meets the sphere at `tc - sqrt(r^2 - p^2)` and
     /// `tc <= |c|`. In the plane of the centre's depth a pixel is at least p away from the centre.
     #[inline(always)]
-    fn draw_one(&self, spheres: &KernelSpheres, lane: usize) {
-        let (radius, distance) = (spheres.radius.0[lane], spheres.distance.0[lane]);
-        let [across, up] = [(0, self.columns), (1, self.rows)]
-            .map(|(axis, count)| Span::new(spheres.middle[axis].0[lane], radius, spheres.pixel[axis].0[lane], count));
-        for row in up.first..=up.last {
-            let rest_2 = radius * radius - up.farthest_2(row);
-            for column in across.first..=across.last {
-                let half_chord_2 = rest_2 - across.farthest_2(column);
-                if half_chord_2 > 0.0 {
-                    self.lower(row * self.columns + column, distance - half_chord_2.sqrt());
+    fn draw_one<S: Simd>(&self, simd: S, spheres: &KernelSpheres, lane: usize) {
+        let (radius, distance) = (spheres.radius.0[lane], simd.splat(spheres.distance.0[lane]));
+        let (across, up) = (spheres.across.span(lane), spheres.up.span(lane));
+        for row in up.cells.clone() {
+            let rest_2 = simd.splat(radius * radius) - up.farthest_2(simd, simd.splat(row as f32));
+            for first in across.cells.clone().step_by(LANES) {
+                let half_chord_2 = rest_2 - across.farthest_2(simd, simd.splat(first as f32) + simd.load(&COUNTING));
+                let distances = (distance - half_chord_2.sqrt()).lanes();
+                let covered = simd.splat(0.0).lt(half_chord_2).bits() & lowest_bits(across.cells.end - first);
+                for column in set_bits(covered) {
+                    self.lower(row * self.columns + first + column, distances.0[column]);
                 }
             }
         }
     }
 
+    #[inline(always)]
     fn lower(&self, cell: usize, distance: f32) {
         // The kernel sphere lies before the eye, so the distance is positive, and positive floats are ordered as their
         // bits. Reading first spares the costly write where another sphere is nearer.
@@ -275,38 +310,68 @@ impl Pass<'_> {
 
 /// Sixteen kernel spheres in the image.
 struct KernelSpheres {
-    /// x and y of the centres, pixels.
-    middle: [Lanes; 2],
-    /// Width and height of a pixel at the centres' depth, world units.
-    pixel: [Lanes; 2],
+    across: Spans<Lanes>,
+    up: Spans<Lanes>,
     /// Of the centres, along rays.
     distance: Lanes,
-    /// Distance before which no ray meets them.
-    front: Lanes,
     radius: Lanes,
 }
 
-/// The cells along an axis that a kernel sphere may cover.
+/// What sixteen kernel spheres cover along an axis.
+struct Spans<T> {
+    /// The centres, pixels.
+    middle: T,
+    /// World units of a pixel at the centres' depth.
+    pixel: T,
+    /// The cells of the centres.
+    cell: T,
+    /// The first cell whose outermost pixel centres may both be covered, and the one behind the last.
+    first: T,
+    end: T,
+}
+
+impl<V: Vector> Spans<V> {
+    #[inline(always)]
+    fn stored(&self) -> Spans<Lanes> {
+        let Self { middle, pixel, cell, first, end } = self;
+        Spans { middle: middle.lanes(), pixel: pixel.lanes(), cell: cell.lanes(), first: first.lanes(), end: end.lanes() }
+    }
+}
+
+impl Spans<Lanes> {
+    #[inline(always)]
+    fn span(&self, lane: usize) -> Span {
+        let cells = self.first.0[lane] as usize..self.end.0[lane] as usize;
+        Span { middle: self.middle.0[lane], size: self.pixel.0[lane], cells }
+    }
+}
+
+/// 0, 1, 2 ...
+const COUNTING: Lanes = {
+    let mut lanes = Lanes([0.0; LANES]);
+    let mut lane = 0;
+    while lane < LANES {
+        lanes.0[lane] = lane as f32;
+        lane += 1;
+    }
+    lanes
+};
+
+/// What one of them covers along an axis.
 struct Span {
-    /// The centre, pixels.
     middle: f32,
-    /// World units of a pixel at the centre's depth.
     size: f32,
-    first: usize,
-    last: usize,
+    cells: Range<usize>,
 }
 
 impl Span {
-    fn new(middle: f32, kernel_radius: f32, size: f32, count: usize) -> Self {
-        let cell = |pixel: f32| ((pixel / CELL as f32).max(0.0) as usize).min(count - 1);
-        let radius = kernel_radius / size;
-        Self { middle, size, first: cell(middle - radius), last: cell(middle + radius) }
-    }
-
-    /// Squared distance from the centre to the farthest pixel centre of a cell, world units.
-    fn farthest_2(&self, cell: usize) -> f32 {
-        let first = (cell * CELL) as f32 + 0.5;
-        let farthest = (self.middle - first).abs().max((self.middle - first - (CELL - 1) as f32).abs()) * self.size;
+    /// Squared distances from the centre to the farthest pixel centres of cells, world units.
+    #[inline(always)]
+    fn farthest_2<S: Simd>(&self, simd: S, cells: S::Vector) -> S::Vector {
+        let (side, half_side) = (simd.splat(CELL as f32), simd.splat(0.5 * CELL as f32));
+        let to_middle = cells.mul_add(side, half_side) - simd.splat(self.middle);
+        let to_farthest = to_middle.max(simd.splat(0.0) - to_middle) + simd.splat(0.5 * (CELL - 1) as f32);
+        let farthest = to_farthest * simd.splat(self.size);
         farthest * farthest
     }
 }

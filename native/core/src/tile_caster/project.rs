@@ -64,11 +64,10 @@ impl Projector {
         // In double precision: only the subtraction of the eye makes coordinates small. In plain loops, which compilers turn
         // into vectors with the path's instructions; in a closure they would not have them.
         let mut center = [Lanes::splat(0.0); 3];
-        for (axis, row) in self.rows.iter().enumerate() {
-            for lane in 0..LANES {
-                let [x, y, z] = positions[lane];
+        for (axis, row) in center.iter_mut().zip(&self.rows) {
+            for (turned, [x, y, z]) in axis.0.iter_mut().zip(positions) {
                 let (x, y, z) = (f64::from(x) - self.eye[0], f64::from(y) - self.eye[1], f64::from(z) - self.eye[2]);
-                center[axis].0[lane] = (row[0] * x + row[1] * y + row[2] * z) as f32;
+                *turned = (row[0] * x + row[1] * y + row[2] * z) as f32;
             }
         }
         let [x, y, depth] = center.each_ref().map(|lanes| simd.load(lanes));
@@ -131,9 +130,9 @@ fn sixteen(balls: &Balls<'_>, first: usize) -> ([[f32; 3]; LANES], Lanes) {
     }
     let last = balls.len() - 1;
     let (mut positions, mut radii) = ([[0.0; 3]; LANES], Lanes::splat(0.0));
-    for lane in 0..LANES {
+    for (lane, (position, radius)) in positions.iter_mut().zip(&mut radii.0).enumerate() {
         let index = (first + lane).min(last);
-        (positions[lane], radii.0[lane]) = (balls.positions()[index], balls.radii()[index]);
+        (*position, *radius) = (balls.positions()[index], balls.radii()[index]);
     }
     (positions, radii)
 }
