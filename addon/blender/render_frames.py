@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from ..fluid.image import ImageBuffers, RenderInfo
 from ..output.exr_process import ExrProcess
 from ..output.frame_path import frame_path
 from ..output.whole_file import prepare_place
+from ..render.method import timed
 from ..render.renderer import render
 from .preview import write_png
 from .read_camera import read_camera
@@ -161,11 +160,11 @@ def _begin_frame(job: RenderJob, frame: int, writer: ExrProcess, is_cancelled: C
 
 def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bool]) -> ImageBuffers:
     milliseconds: dict[str, float] = {}
-    with _timed(milliseconds, "scene"):
+    with timed(milliseconds, "scene"):
         job.scene.frame_set(report.frame)
         job.view_layer.update()
         depsgraph = job.view_layer.depsgraph
-    with _timed(milliseconds, "read"):
+    with timed(milliseconds, "read"):
         camera = read_camera(depsgraph, job.camera, job.resolution)
         balls = read_balls(depsgraph)
     passes = (*job.passes, "combined") if job.use_preview else job.passes
@@ -192,15 +191,8 @@ def _threads(scene: bpy.types.Scene) -> int:
 
 
 def _write_preview(image: ImageBuffers, report: FrameReport) -> None:
-    with _timed(report.info.milliseconds, "preview"):
+    with timed(report.info.milliseconds, "preview"):
         try:
             write_png(report.path.with_suffix(".png"), image["combined"])
         except OutputError as error:
             report.error = str(error)
-
-
-@contextmanager
-def _timed(milliseconds: dict[str, float], stage: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    milliseconds[stage] = (time.perf_counter() - start) * 1e3

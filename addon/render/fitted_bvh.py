@@ -12,16 +12,12 @@ import numpy.typing as npt
 from ..fluid.balls import Balls
 from ..fluid.errors import InputError
 from ..fluid.field import Field
-from .native import load, translated_errors
+from .native import fluid_arguments, let_interrupt, load, numbers, translated_errors
 
 FloatArray = npt.NDArray[np.float64]
 
 Watch = Callable[[float], object]
 """Is called with the share of the work that is done, 0 to 1, about fifty times a second; what it raises cancels."""
-
-
-def _let_interrupt(share_done: float) -> None:
-    """Called now and then while the core works, so that Python sees Ctrl-C."""
 
 
 class FirstHits(NamedTuple):
@@ -124,18 +120,14 @@ class FittedBvh:
         discards: bool = True,
         proves: bool = True,
         threads: int = 0,
-        watch: Watch = _let_interrupt,
+        watch: Watch = let_interrupt,
     ) -> None:
         if hierarchy not in ("fitted", "overlapping"):
             raise InputError(f"Unknown hierarchy '{hierarchy}': choose fitted or overlapping")
         self._balls = balls
         with translated_errors():
             self._native = load().FittedBvh(
-                balls.positions,
-                balls.radii,
-                balls.weights,
-                field.density_kernel.coefficients,
-                field.isovalue,
+                *fluid_arguments(balls, field),
                 overlapping=hierarchy == "overlapping",
                 fits=fits,
                 tightens=tightens,
@@ -158,7 +150,7 @@ class FittedBvh:
         t_max: npt.ArrayLike = np.inf,
         *,
         threads: int = 0,
-        watch: Watch = _let_interrupt,
+        watch: Watch = let_interrupt,
     ) -> FirstHits:
         """Find where rays first cross the surface, in either direction: a ray that begins inside sees it from within.
 
@@ -190,7 +182,7 @@ class FittedBvh:
         t_max: npt.ArrayLike = np.inf,
         *,
         threads: int = 0,
-        watch: Watch = _let_interrupt,
+        watch: Watch = let_interrupt,
     ) -> npt.NDArray[np.bool_]:
         """Whether rays cross the surface, (N,); faster than `first_hit`, with the same arguments and errors."""
         with translated_errors():
@@ -205,7 +197,7 @@ class FittedBvh:
         """What finding the first hits of rays takes, a ray; the same arguments and errors as for `first_hit`."""
         rays = _rays(origins, directions, t_min, t_max)
         with translated_errors():
-            sums = self._native.count(*rays, watch=_let_interrupt)
+            sums = self._native.count(*rays, watch=let_interrupt)
         return RayCounts(*(total / max(len(rays[0]), 1) for total in sums))
 
     def arrays(self) -> TreeArrays:
@@ -222,15 +214,8 @@ def _rays(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """The arguments of native calls."""
     return (
-        _numbers("origins", origins),
-        _numbers("directions", directions),
-        np.atleast_1d(_numbers("t_min", t_min)),
-        np.atleast_1d(_numbers("t_max", t_max)),
+        numbers("origins", origins),
+        numbers("directions", directions),
+        np.atleast_1d(numbers("t_min", t_min)),
+        np.atleast_1d(numbers("t_max", t_max)),
     )
-
-
-def _numbers(name: str, values: npt.ArrayLike) -> FloatArray:
-    try:
-        return np.asarray(values, np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}") from error

@@ -6,7 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.balls import Balls
 from ..fluid.errors import DeviceError, InputError, MeniscusError
+from ..fluid.field import Field
 
 
 def load() -> Any:
@@ -24,6 +29,29 @@ def load() -> Any:
             f"Meniscus' native core cannot be loaded ({error}): install the extension for your system, or run 'make setup'"
         ) from error
     return meniscus_native
+
+
+def fluid_arguments(balls: Balls, field: Field) -> tuple[Any, ...]:
+    """The first arguments of the module's functions and classes."""
+    return balls.positions, balls.radii, balls.weights, field.density_kernel.coefficients, field.isovalue
+
+
+def numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """An array as the module takes it; float64 and C-contiguous ones are not copied.
+
+    Raises
+    ------
+    InputError
+        It is no array of numbers.
+    """
+    try:
+        return np.asarray(values, np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be an array of numbers: {error}") from error
+
+
+def let_interrupt(share_done: float) -> None:
+    """Called now and then while the core works, so that Python sees Ctrl-C."""
 
 
 @contextmanager

@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.balls import Balls
-from ..fluid.errors import InputError
 from ..fluid.field import Field
-from .native import load, translated_errors
+from .native import fluid_arguments, let_interrupt, load, numbers, translated_errors
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -43,7 +42,7 @@ def cast(balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.Arr
         The native core is missing, or there is too little memory.
     """
     with translated_errors():
-        t, normals = load().oracle_cast(*_arguments(balls, field, origins, directions), watch=_let_interrupt)
+        t, normals = load().oracle_cast(*_arguments(balls, field, origins, directions), watch=let_interrupt)
     return t, normals
 
 
@@ -65,28 +64,9 @@ def crossings(
         starts inside.
     """
     with translated_errors():
-        rays, t, is_entering = load().oracle_crossings(*_arguments(balls, field, origins, directions), watch=_let_interrupt)
+        rays, t, is_entering = load().oracle_crossings(*_arguments(balls, field, origins, directions), watch=let_interrupt)
     return rays, t, is_entering
 
 
 def _arguments(balls: Balls, field: Field, origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Any, ...]:
-    return (
-        balls.positions,
-        balls.radii,
-        balls.weights,
-        field.density_kernel.coefficients,
-        field.isovalue,
-        _vectors("origins", origins),
-        _vectors("directions", directions),
-    )
-
-
-def _vectors(name: str, values: npt.ArrayLike) -> FloatArray:
-    try:
-        return np.ascontiguousarray(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}") from error
-
-
-def _let_interrupt(share_done: float) -> None:
-    """Called now and then while the core works, so that Python sees Ctrl-C."""
+    return *fluid_arguments(balls, field), numbers("origins", origins), numbers("directions", directions)

@@ -52,13 +52,8 @@ class TileCaster:
             yield surface
 
     def _caster(self, request: Request) -> Any:
-        balls, field = request.balls, request.field
         return self._native.TileCaster(
-            balls.positions,
-            balls.radii,
-            balls.weights,
-            field.density_kernel.coefficients,
-            field.isovalue,
+            *native.fluid_arguments(request.balls, request.field),
             **_view(request.camera),
             threads=request.threads,
             watch=request.watch,

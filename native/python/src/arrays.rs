@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
+use meniscus_core::balls::Balls;
 use meniscus_core::error::{Error, Result};
+use meniscus_core::field::Field;
+use meniscus_core::kernel::Kernel;
 use numpy::{
     Element, PyArrayDescrMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods, dtype,
 };
@@ -37,6 +40,42 @@ impl<'py, T: Element, const C: usize> Rows<'py, T, C> {
     pub fn numbers(&self) -> &[T] {
         // `borrow` has seen that it is contiguous and aligned.
         self.0.as_slice().unwrap_or_default()
+    }
+}
+
+/// A fluid as Python gives it: positions float32 (N, 3), radii and weights float32 (N,), borrowed; the coefficients of the
+/// kernel, the constant first, and the isovalue.
+pub struct FluidArrays<'py> {
+    positions: Rows<'py, f32, 3>,
+    radii: Rows<'py, f32, 1>,
+    weights: Rows<'py, f32, 1>,
+    kernel: Vec<f64>,
+    isovalue: f64,
+}
+
+impl<'py> FluidArrays<'py> {
+    /// Borrows the arguments.
+    ///
+    /// # Errors
+    /// ValueError that says what was expected.
+    pub fn borrow([positions, radii, weights]: [&Bound<'py, PyAny>; 3], kernel: Vec<f64>, isovalue: f64) -> PyResult<Self> {
+        Ok(Self {
+            positions: Rows::borrow("positions", positions)?,
+            radii: Rows::borrow("radii", radii)?,
+            weights: Rows::borrow("weights", weights)?,
+            kernel,
+            isovalue,
+        })
+    }
+
+    /// The balls and their field.
+    ///
+    /// # Errors
+    /// ValueError where they are unusable.
+    pub fn checked(&self) -> PyResult<(Balls<'_>, Field)> {
+        let balls = Balls::new(self.positions.rows(), self.radii.numbers(), self.weights.numbers());
+        let field = Kernel::new(&self.kernel).and_then(|kernel| Field::new(kernel, self.isovalue));
+        Ok((balls.map_err(python_error)?, field.map_err(python_error)?))
     }
 }
 

@@ -1,14 +1,11 @@
 //! The class `FittedBvh` of `meniscus_native`.
 
-use meniscus_core::balls::Balls;
-use meniscus_core::field::Field;
 use meniscus_core::fitted_bvh::{FittedBvh as Bvh, Hierarchy, Node, Options, Rays};
-use meniscus_core::kernel::Kernel;
 use meniscus_core::memory;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::Rows;
+use crate::arrays::{FluidArrays, Rows};
 use crate::run::{python_error, run};
 
 type Hits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<i32>>);
@@ -19,8 +16,7 @@ const NODE_NUMBERS: usize = 8;
 
 /// A tree over balls, in which any rays find the surface (Gourmel et al. 2010).
 ///
-/// positions float32 (N, 3), radii and weights float32 (N,), world space; coefficients: those of the kernel polynomial, the
-/// constant first. `threads` 0: one for each core. `watch` is called with the share of the work that is done; what it
+/// positions float32 (N, 3), radii and weights float32 (N,), world space; kernel: its coefficients, the constant first. `threads` 0: one for each core. `watch` is called with the share of the work that is done; what it
 /// raises cancels.
 #[pyclass(frozen)]
 pub struct FittedBvh {
@@ -30,7 +26,7 @@ pub struct FittedBvh {
 #[pymethods]
 impl FittedBvh {
     #[new]
-    #[pyo3(signature = (positions, radii, weights, coefficients, isovalue, *, overlapping=false, fits=true, tightens=true,
+    #[pyo3(signature = (positions, radii, weights, kernel, isovalue, *, overlapping=false, fits=true, tightens=true,
                         discards=true, proves=true, threads=0, watch=None))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn new(
@@ -38,7 +34,7 @@ impl FittedBvh {
         positions: &Bound<'_, PyAny>,
         radii: &Bound<'_, PyAny>,
         weights: &Bound<'_, PyAny>,
-        coefficients: Vec<f64>,
+        kernel: Vec<f64>,
         isovalue: f64,
         overlapping: bool,
         fits: bool,
@@ -48,17 +44,12 @@ impl FittedBvh {
         threads: usize,
         watch: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let positions = Rows::<f32, 3>::borrow("positions", positions)?;
-        let radii = Rows::<f32, 1>::borrow("radii", radii)?;
-        let weights = Rows::<f32, 1>::borrow("weights", weights)?;
-        let (positions, radii, weights) = (positions.rows(), radii.numbers(), weights.numbers());
+        let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
         let hierarchy = if overlapping { Hierarchy::Overlapping } else { Hierarchy::Fitted };
         let options = Options { hierarchy, fits, tightens, discards, proves };
-        run(python, threads, watch, |job| {
-            let balls = Balls::new(positions, radii, weights)?;
-            let field = Field::new(Kernel::new(&coefficients)?, isovalue)?;
-            Ok(Self { bvh: Bvh::build(&balls, &field, &options, job)? })
-        })
+        let (balls, field) = fluid.checked()?;
+        let bvh = run(python, threads, watch, |job| Bvh::build(&balls, &field, &options, job))?;
+        Ok(Self { bvh })
     }
 
     /// Where rays first cross the surface, either way: t float64 (N,), infinite where they do not; normals float32 (N, 3),

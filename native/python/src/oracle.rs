@@ -1,15 +1,11 @@
 //! The exact caster for Python.
 
-use meniscus_core::balls::Balls;
-use meniscus_core::error::Result;
-use meniscus_core::field::Field;
 use meniscus_core::job::Job;
-use meniscus_core::kernel::Kernel;
 use meniscus_core::oracle::{Rays, cast, crossings};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::Rows;
+use crate::arrays::{FluidArrays, Rows};
 use crate::run::{python_error, run};
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
@@ -37,9 +33,10 @@ pub fn oracle_cast<'py>(
     threads: usize,
     watch: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Column<'py, f64>, Bound<'py, PyArray2<f64>>)> {
-    let scene = Scene::borrow(positions, radii, weights, origins, directions)?;
-    let field = field(&kernel, isovalue).map_err(python_error)?;
-    let (balls, rays) = scene.checked().map_err(python_error)?;
+    let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
+    let (origins, directions) = (Rows::borrow("origins", origins)?, Rows::borrow("directions", directions)?);
+    let (balls, field) = fluid.checked()?;
+    let rays = Rays::new(origins.rows(), directions.rows()).map_err(python_error)?;
     let first = run(python, threads, watch, |job: &Job| cast(balls, field, rays, job))?;
     let normals = first.normals.into_flattened().into_pyarray(python).reshape([rays.len(), 3])?;
     Ok((first.t.into_pyarray(python), normals))
@@ -64,45 +61,10 @@ pub fn oracle_crossings<'py>(
     threads: usize,
     watch: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Column<'py, i64>, Column<'py, f64>, Column<'py, bool>)> {
-    let scene = Scene::borrow(positions, radii, weights, origins, directions)?;
-    let field = field(&kernel, isovalue).map_err(python_error)?;
-    let (balls, rays) = scene.checked().map_err(python_error)?;
+    let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
+    let (origins, directions) = (Rows::borrow("origins", origins)?, Rows::borrow("directions", directions)?);
+    let (balls, field) = fluid.checked()?;
+    let rays = Rays::new(origins.rows(), directions.rows()).map_err(python_error)?;
     let all = run(python, threads, watch, |job: &Job| crossings(balls, field, rays, job))?;
     Ok((all.rays.into_pyarray(python), all.t.into_pyarray(python), all.is_entering.into_pyarray(python)))
-}
-
-/// The arrays of a call.
-struct Scene<'py> {
-    positions: Rows<'py, f32, 3>,
-    radii: Rows<'py, f32, 1>,
-    weights: Rows<'py, f32, 1>,
-    origins: Rows<'py, f64, 3>,
-    directions: Rows<'py, f64, 3>,
-}
-
-impl<'py> Scene<'py> {
-    fn borrow(
-        positions: &Bound<'py, PyAny>,
-        radii: &Bound<'py, PyAny>,
-        weights: &Bound<'py, PyAny>,
-        origins: &Bound<'py, PyAny>,
-        directions: &Bound<'py, PyAny>,
-    ) -> PyResult<Self> {
-        Ok(Self {
-            positions: Rows::borrow("positions", positions)?,
-            radii: Rows::borrow("radii", radii)?,
-            weights: Rows::borrow("weights", weights)?,
-            origins: Rows::borrow("origins", origins)?,
-            directions: Rows::borrow("directions", directions)?,
-        })
-    }
-
-    fn checked(&self) -> Result<(Balls<'_>, Rays<'_>)> {
-        let balls = Balls::new(self.positions.rows(), self.radii.numbers(), self.weights.numbers())?;
-        Ok((balls, Rays::new(self.origins.rows(), self.directions.rows())?))
-    }
-}
-
-fn field(kernel: &[f64], isovalue: f64) -> Result<Field> {
-    Field::new(Kernel::new(kernel)?, isovalue)
 }

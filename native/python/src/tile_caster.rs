@@ -1,13 +1,10 @@
 //! `TileCaster`: what a camera sees.
 
-use meniscus_core::balls::Balls;
-use meniscus_core::field::Field;
-use meniscus_core::kernel::Kernel;
 use meniscus_core::simd::Path;
 use meniscus_core::tile_caster::{self, Attribute, Image, View};
 use pyo3::prelude::*;
 
-use crate::arrays::{Pixels, Rows, check_rows};
+use crate::arrays::{FluidArrays, Pixels, Rows, check_rows};
 use crate::run::{python_error, run};
 
 /// A fluid as one view sees it: projected, culled and binned, ready to be cast.
@@ -43,18 +40,11 @@ impl TileCaster {
         threads: usize,
         watch: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let positions = Rows::<f32, 3>::borrow("positions", positions)?;
-        let radii = Rows::<f32, 1>::borrow("radii", radii)?;
-        let weights = Rows::<f32, 1>::borrow("weights", weights)?;
-        let (positions, radii, weights) = (positions.rows(), radii.numbers(), weights.numbers());
+        let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
         let view = View { camera_from_world, eye, window, is_perspective, width, height, clip };
         let path = Path::chosen().map_err(python_error)?;
-        run(python, threads, watch, |job| {
-            let balls = Balls::new(positions, radii, weights)?;
-            let field = Field::new(Kernel::new(&kernel)?, isovalue)?;
-            tile_caster::TileCaster::new(path, &balls, &field, &view, job)
-        })
-        .map(Self)
+        let (balls, field) = fluid.checked()?;
+        run(python, threads, watch, |job| tile_caster::TileCaster::new(path, &balls, &field, &view, job)).map(Self)
     }
 
     /// Cast every stride-th pixel (4, 2 or 1) along both axes and fill the pixels between.
