@@ -7,8 +7,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-import meniscus
-
 from . import fitted_bvh, machine, report
 from .options import parser
 from .renderers import Picture, Renderers
@@ -39,6 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
     about = machine.describe()
     print(about["warning"], flush=True)
     rows = []
+    plan = Plan(options.repeats, options.budget)
     with Renderers("bench") as renderers:
         described = renderers.describe()
         about["gl_renderer"] = described["gl_renderer"]
@@ -47,18 +46,11 @@ def main(arguments: list[str] | None = None) -> None:
             chosen = variants(scene, methods, described["simd_paths"])
             for size in options.sizes:
                 print(f"{scene} {size[0]}x{size[1]}", flush=True)
-                rows += measure(renderers, Picture(scene, *size), chosen, Plan(options.repeats, options.budget), options.limit)
-    trees = measure_trees(options.scenes, Plan(options.repeats, options.budget), options.limit)
+                rows += measure(renderers, Picture(scene, *size), chosen, plan, options.limit)
+    trees = fitted_bvh.measure(options.scenes, plan, options.limit, report.OUT / "bench.log")
     data = {"machine": about, "options": vars(options), "rows": list(map(asdict, rows)), "trees": list(map(asdict, trees))}
     parts = [report.machine_text(about), table_of(rows)] + ([fitted_bvh.table_of(trees)] if trees else [])
     report.publish("bench", data, "\n\n".join(parts), options.update_docs)
-
-
-def measure_trees(scenes: Sequence[str], plan: Plan, limit: float) -> list[fitted_bvh.Row]:
-    """The rows of the fitted BVH, where Meniscus has one."""
-    if "FittedBvh" not in meniscus.__all__:
-        return []
-    return fitted_bvh.measure(scenes, plan, limit, report.OUT / "bench.log")
 
 
 def measure(renderers: Renderers, picture: Picture, chosen: Sequence[Variant], plan: Plan, limit: float) -> list[Row]:
