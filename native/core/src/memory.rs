@@ -1,6 +1,8 @@
 //! Arrays that fail with an error where the system has too little memory; Rust's own would abort the process, and Blender
 //! with it. Everything whose size goes with the number of balls or pixels is made here.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use crate::error::{Error, Result};
 
 /// An empty vector with room for `count` elements.
@@ -42,6 +44,39 @@ pub fn prefetch<T>(soon: &T) {
 /// `OutOfMemory` where the system has not as much.
 pub fn reserve<T>(vector: &mut Vec<T>, count: usize) -> Result<()> {
     vector.try_reserve(count).map_err(|_| Error::OutOfMemory(count.saturating_mul(size_of::<T>())))
+}
+
+/// Bytes that spare vectors of a kind may hold.
+const MOST_SPARE: usize = 64 << 20;
+
+/// Vectors that are done with, for the next frame: to get fresh memory from the system takes longer than to fill it.
+pub struct Spares<T>(Mutex<Vec<Vec<T>>>);
+
+impl<T> Spares<T> {
+    /// None yet.
+    pub const fn new() -> Self {
+        Self(Mutex::new(Vec::new()))
+    }
+
+    /// An empty vector, with room where there is a spare one.
+    pub fn take(&self) -> Vec<T> {
+        self.vectors().pop().unwrap_or_default()
+    }
+
+    /// Keeps a vector unless there are enough; its elements are dropped.
+    pub fn give(&self, mut vector: Vec<T>) {
+        vector.clear();
+        let mut vectors = self.vectors();
+        let held: usize = vectors.iter().map(|vector| vector.capacity() * size_of::<T>()).sum();
+        if held + vector.capacity() * size_of::<T>() <= MOST_SPARE {
+            vectors.push(vector);
+        }
+    }
+
+    /// A thread that panicked has left nothing half done.
+    fn vectors(&self) -> MutexGuard<'_, Vec<Vec<T>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@
 //! on the number of threads.
 
 mod bins;
+mod culling;
 mod image;
+mod kernel_spheres;
 mod occlusion;
 mod packet;
 mod polynomial;
@@ -17,7 +19,8 @@ use rayon::prelude::*;
 
 use self::bins::{Bins, TILE};
 pub use self::image::{Attribute, Image, NO_BALL};
-use self::occlusion::{CELL, CHUNK, Occlusion};
+use self::culling::Culled;
+use self::occlusion::CELL;
 use self::packet::{ActiveBalls, Thresholds, Walk};
 use self::polynomial::Polynomial;
 use self::tile::{Blends, Entries, PacketPixels, PixelCenters, Rays, Surface};
@@ -36,7 +39,6 @@ pub struct TileCaster {
     path: Path,
     view: View,
     field: Field,
-    occlusion: Occlusion,
     bins: Bins,
     centers: PixelCenters,
     thresholds: Thresholds,
@@ -50,15 +52,12 @@ impl TileCaster {
     /// `InvalidInput` for an unusable view, `Cancelled`, `OutOfMemory`.
     pub fn new(path: Path, balls: &Balls<'_>, field: &Field, view: &View, job: &Job) -> Result<Self> {
         view.check()?;
-        job.expect(3 * balls.len().div_ceil(CHUNK));
-        let occlusion = Occlusion::new(path, balls, field, view, job)?;
         let thresholds = Thresholds::new(field, balls.greatest_weight());
-        let bins = Bins::new(path, balls, view, &occlusion, job)?;
+        let bins = Bins::new(Culled::new(path, balls, field, view, job)?, view, job)?;
         Ok(Self {
             path,
             view: *view,
             field: *field,
-            occlusion,
             bins,
             centers: PixelCenters::new(view),
             thresholds,
@@ -155,7 +154,7 @@ impl TileTask<'_> {
         for y in (bottom..end[1]).step_by(CELL * self.stride) {
             for x in (left..end[0]).step_by(CELL * self.stride) {
                 let pixels = PacketPixels { x, y, stride: self.stride };
-                let rays = Rays::new(simd, &caster.view, &caster.centers, &caster.occlusion, pixels, end);
+                let rays = Rays::new(simd, &caster.view, &caster.centers, &caster.bins.occlusion, pixels, end);
                 let mut surface = Surface::new(self.image, &caster.view, pixels, rays.lanes, &mut self.scratch.blends);
                 let mut walk = Walk {
                     simd,

@@ -16,8 +16,20 @@ pub struct Projected {
     pub center: [Lanes; 3],
     /// Influence radii.
     pub radius: Lanes,
+    /// q.
+    pub weight: Lanes,
     /// Distance of the centre along a ray through it: from the eye, or planar for parallel rays.
     pub distance: Lanes,
+}
+
+impl Projected {
+    /// Distances before which no ray meets the influence spheres.
+    #[inline(always)]
+    pub fn front<S: Simd>(&self, simd: S) -> S::Vector {
+        let (distance, zero) = (simd.load(&self.distance), simd.splat(0.0));
+        let error = distance.max(zero - distance) * simd.splat(DISTANCE_ERROR);
+        distance - error - simd.load(&self.radius)
+    }
 }
 
 /// First and last column and row of pixels, whole numbers; sixteen balls' rectangles.
@@ -27,6 +39,20 @@ pub struct Rectangles {
     pub x_max: Lanes,
     pub y_min: Lanes,
     pub y_max: Lanes,
+}
+
+impl Rectangles {
+    /// First and last columns, first and last rows.
+    #[inline(always)]
+    pub fn sides(&self) -> [&Lanes; 4] {
+        [&self.x_min, &self.x_max, &self.y_min, &self.y_max]
+    }
+
+    /// First and last column, first and last row of one that is not empty.
+    #[inline(always)]
+    pub fn pixels(&self, lane: usize) -> [u16; 4] {
+        self.sides().map(|side| side.0[lane] as u16)
+    }
 }
 
 /// What projecting needs of a view, in the form that it needs.
@@ -60,7 +86,7 @@ impl Projector {
     /// Projects the balls from `first` on, at most sixteen; lanes beyond the last repeat it.
     #[inline(always)]
     pub fn project<S: Simd>(&self, simd: S, balls: &Balls<'_>, first: usize) -> Projected {
-        let (positions, radius) = sixteen(balls, first);
+        let (positions, radius, weight) = sixteen(balls, first);
         // In double precision: only the subtraction of the eye makes coordinates small. In plain loops, which compilers turn
         // into vectors with the path's instructions; in a closure they would not have them.
         let mut center = [Lanes::splat(0.0); 3];
@@ -72,7 +98,7 @@ impl Projector {
         }
         let [x, y, depth] = center.each_ref().map(|lanes| simd.load(lanes));
         let distance = if self.is_perspective { x.mul_add(x, y.mul_add(y, depth * depth)).sqrt() } else { depth };
-        Projected { center, radius, distance: distance.lanes() }
+        Projected { center, radius, weight, distance: distance.lanes() }
     }
 
     /// The pixels that influence spheres may cover, and a bit for each of the `count` balls that may be seen at all.
@@ -122,23 +148,44 @@ impl Projector {
     }
 }
 
-/// Positions and radii of sixteen balls from `first` on; beyond the last it is repeated.
+/// Positions, radii and weights of sixteen balls from `first` on; beyond the last it is repeated.
 #[inline(always)]
-fn sixteen(balls: &Balls<'_>, first: usize) -> ([[f32; 3]; LANES], Lanes) {
-    if let (Some(positions), Some(radii)) = (balls.positions()[first..].first_chunk(), balls.radii()[first..].first_chunk()) {
-        return (*positions, Lanes(*radii));
+fn sixteen(balls: &Balls<'_>, first: usize) -> ([[f32; 3]; LANES], Lanes, Lanes) {
+    let (positions, radii, weights) = (&balls.positions()[first..], &balls.radii()[first..], &balls.weights()[first..]);
+    if let (Some(positions), Some(radii), Some(weights)) =
+        (positions.first_chunk(), radii.first_chunk(), weights.first_chunk())
+    {
+        return (*positions, Lanes(*radii), Lanes(*weights));
     }
-    let last = balls.len() - 1;
-    let (mut positions, mut radii) = ([[0.0; 3]; LANES], Lanes::splat(0.0));
-    for (lane, (position, radius)) in positions.iter_mut().zip(&mut radii.0).enumerate() {
-        let index = (first + lane).min(last);
-        (*position, *radius) = (balls.positions()[index], balls.radii()[index]);
+    let (mut sixteen, mut radius, mut weight) = ([[0.0; 3]; LANES], Lanes::splat(0.0), Lanes::splat(0.0));
+    for lane in 0..LANES {
+        let index = lane.min(radii.len() - 1);
+        (sixteen[lane], radius.0[lane], weight.0[lane]) = (positions[index], radii[index], weights[index]);
     }
-    (positions, radii)
+    (sixteen, radius, weight)
 }
 
 /// The lowest `count` bits of sixteen.
 #[inline(always)]
 pub fn lowest_bits(count: usize) -> u16 {
     if count < LANES { (1 << count) - 1 } else { u16::MAX }
+}
+
+/// The numbers of the bits that are set, the lowest first.
+#[inline(always)]
+pub fn set_bits(bits: u16) -> impl Iterator<Item = usize> {
+    let mut rest = bits;
+    std::iter::from_fn(move || {
+        let lane = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
+        rest &= rest - 1;
+        Some(lane)
+    })
+}
+
+/// Whole numbers from 0 to 2^23 - 1 as integers.
+#[inline(always)]
+pub fn whole_numbers<S: Simd>(simd: S, numbers: S::Vector) -> [usize; LANES] {
+    // Above 2^23 the last bits of a float are the whole number.
+    let shifted = (numbers + simd.splat((1 << 23) as f32)).lanes();
+    shifted.0.map(|number| (number.to_bits() & ((1 << 23) - 1)) as usize)
 }

@@ -2,8 +2,8 @@
 
 use super::bins::{Bins, front_of_entry};
 use super::image::{Image, Pixels};
-use super::occlusion::{CELL, Occlusion, set_bits};
-use super::project::DISTANCE_ERROR;
+use super::occlusion::{CELL, Occlusion};
+use super::project::{DISTANCE_ERROR, set_bits};
 use super::view::View;
 use crate::balls::bounded_weight;
 use crate::error::Result;
