@@ -99,6 +99,18 @@ impl Vector for Numbers {
     }
 
     #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm256_rcp_ps(self.0), _mm256_rcp_ps(self.1)) }
+    }
+
+    #[inline(always)]
+    fn inverse_sqrt_estimate(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm256_rsqrt_ps(self.0), _mm256_rsqrt_ps(self.1)) }
+    }
+
+    #[inline(always)]
     fn floor(self) -> Self {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm256_floor_ps(self.0), _mm256_floor_ps(self.1)) }
@@ -200,6 +212,7 @@ impl Mask for Bits {
 impl Simd for Avx2 {
     type Vector = Numbers;
     type Mask = Bits;
+    const ESTIMATE_ERROR: f32 = 1.5 / (1 << 12) as f32;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Numbers {

@@ -91,6 +91,18 @@ impl Vector for Numbers {
     }
 
     #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_rcp14_ps(self.0)) }
+    }
+
+    #[inline(always)]
+    fn inverse_sqrt_estimate(self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_rsqrt14_ps(self.0)) }
+    }
+
+    #[inline(always)]
     fn floor(self) -> Self {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(self.0)) }
@@ -183,6 +195,7 @@ impl Mask for Bits {
 impl Simd for Avx512 {
     type Vector = Numbers;
     type Mask = Bits;
+    const ESTIMATE_ERROR: f32 = 1.0 / (1 << 14) as f32;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Numbers {

@@ -43,6 +43,11 @@ pub trait Vector: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<O
     fn max(self, other: Self) -> Self;
     /// The square root of each lane.
     fn sqrt(self) -> Self;
+    /// The reciprocal of each lane, within a share of [`Simd::ESTIMATE_ERROR`]; for numbers from 1e-30 to 1e30.
+    fn reciprocal_estimate(self) -> Self;
+    /// The reciprocal of the square root of each lane, within a share of [`Simd::ESTIMATE_ERROR`]; for numbers from 1e-30 to
+    /// 1e30.
+    fn inverse_sqrt_estimate(self) -> Self;
     /// The greatest whole number that is not greater than the lane.
     fn floor(self) -> Self;
     /// Where `self < other`.
@@ -92,6 +97,8 @@ pub trait Simd: Copy + Send + Sync {
     type Mask: Mask;
     /// Whether work may be compiled several times for this path, once for each of its special cases.
     const IS_SPECIALISED: bool = true;
+    /// How wrong an estimate of a reciprocal may be, as a share.
+    const ESTIMATE_ERROR: f32;
 
     /// The same number in every lane.
     fn splat(self, value: f32) -> Self::Vector;

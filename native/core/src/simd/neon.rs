@@ -85,6 +85,25 @@ impl Vector for Numbers {
     }
 
     #[inline(always)]
+    fn reciprocal_estimate(self) -> Self {
+        // The instruction gives eight bits; a Newton step doubles them.
+        // SAFETY: NEON is always there.
+        Self(self.0.map(|part| unsafe {
+            let estimate = vrecpeq_f32(part);
+            vmulq_f32(estimate, vrecpsq_f32(part, estimate))
+        }))
+    }
+
+    #[inline(always)]
+    fn inverse_sqrt_estimate(self) -> Self {
+        // SAFETY: NEON is always there.
+        Self(self.0.map(|part| unsafe {
+            let estimate = vrsqrteq_f32(part);
+            vmulq_f32(estimate, vrsqrtsq_f32(vmulq_f32(part, estimate), estimate))
+        }))
+    }
+
+    #[inline(always)]
     fn floor(self) -> Self {
         // SAFETY: NEON is always there.
         Self(self.0.map(|part| unsafe { vrndmq_f32(part) }))
@@ -191,6 +210,7 @@ impl Mask for Bits {
 impl Simd for Neon {
     type Vector = Numbers;
     type Mask = Bits;
+    const ESTIMATE_ERROR: f32 = 1.0 / (1 << 14) as f32;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Numbers {

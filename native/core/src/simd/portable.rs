@@ -109,6 +109,16 @@ impl Vector for Numbers {
     }
 
     #[inline(never)]
+    fn reciprocal_estimate(self) -> Self {
+        Self(self.0.map(f32::recip))
+    }
+
+    #[inline(never)]
+    fn inverse_sqrt_estimate(self) -> Self {
+        Self(self.0.map(|lane| lane.sqrt().recip()))
+    }
+
+    #[inline(never)]
     fn floor(self) -> Self {
         Self(self.0.map(f32::floor))
     }
@@ -209,6 +219,7 @@ impl Mask for Bits {
 impl Simd for Portable {
     type Vector = Numbers;
     type Mask = Bits;
+    const ESTIMATE_ERROR: f32 = f32::EPSILON;
     // Nobody chooses this path for its speed.
     const IS_SPECIALISED: bool = false;
 

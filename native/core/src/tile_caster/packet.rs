@@ -25,11 +25,21 @@ const FIRST_MARGIN: f32 = 5e-7;
 /// A crossing is found where the density is this close to the isovalue, as a share of it.
 const TOLERANCE: f32 = 2e-6;
 
+/// A step to the guessed crossing is the last one where no crossing can be farther off than this share of the isovalue by the
+/// bound of the slope's change; the guess itself is several times better.
+const STEP_TOLERANCE: f32 = 8e-6;
+
 /// The least step, in radii of the least ball: only where a ray grazes the surface would steps be shorter.
 const LEAST_STEP: f32 = 1e-5;
 
 /// Share of a distance by which a kink may be elsewhere than float32 says.
 const KINK_MARGIN: f32 = 1e-6;
+
+/// How fast the slope rises where one has to guess, as a share of the bound.
+const GUESSED_BEND: f32 = 0.25;
+
+/// Less is nothing: the estimates of reciprocals need more.
+const LEAST: f32 = 1e-30;
 
 /// A ball that touches the window, along each ray.
 #[derive(Clone, Copy)]
@@ -145,6 +155,56 @@ struct Kinks<S: Simd> {
     next: S::Vector,
     /// No slope ahead is steeper.
     steepest: S::Vector,
+}
+
+/// A bound of how fast the slope can rise.
+struct Bend<S: Simd> {
+    bend: S::Vector,
+    inverse: S::Vector,
+}
+
+/// How far a ray may go on from where its density is known.
+struct Steps<S: Simd> {
+    /// No crossing is nearer; where the density is beyond the isovalue already, minus how far back the last one is.
+    ahead: S::Vector,
+    /// So far back the density was on the same side, but for the crossing just behind.
+    behind: S::Vector,
+    /// Where the crossing is, about.
+    guess: S::Vector,
+    is_real: S::Mask,
+}
+
+impl<S: Simd> Bend<S> {
+    #[inline(always)]
+    fn new(simd: S, bend: S::Vector) -> Self {
+        let bend = bend.max(simd.splat(LEAST));
+        Self { bend, inverse: simd.splat(1.0) / bend }
+    }
+
+    /// With `gap` to the isovalue and the slope there, the density stays on its side for the positive roots of
+    /// `gap = slope dt + bend dt^2 / 2` ahead and `gap = -slope dt + bend dt^2 / 2` behind.
+    #[inline(always)]
+    fn steps(&self, simd: S, gap: S::Vector, slope: S::Vector) -> Steps<S> {
+        let (zero, least) = (simd.splat(0.0), simd.splat(LEAST));
+        let (shorter, longer) = (simd.splat(1.0 - 4.0 * S::ESTIMATE_ERROR), simd.splat(1.0 + 4.0 * S::ESTIMATE_ERROR));
+        let gap_2 = gap + gap;
+        let pull = gap_2 * self.bend;
+        let rises = zero.lt(slope);
+        let steepness = slope.max(zero - slope);
+        // Of the two forms of the roots the one without cancellation.
+        let sum_of = |square: S::Vector| {
+            let square = square.max(least);
+            square.mul_add(square.inverse_sqrt_estimate(), steepness).max(least)
+        };
+        let square = slope.mul_add(slope, pull);
+        let root_sum = sum_of(square);
+        let near = gap_2 * root_sum.reciprocal_estimate();
+        let near = (near * shorter).min(near * longer);
+        let far = root_sum * self.inverse * shorter;
+        let guess_sum = sum_of(slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)));
+        let guess = gap_2 * guess_sum.reciprocal_estimate();
+        Steps { ahead: near.select(rises, far), behind: far.select(rises, near), guess: guess.select(rises, zero), is_real: zero.lt(square) }
+    }
 }
 
 /// Where the rays of a packet are.
@@ -322,6 +382,9 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
     }
 
     /// Steps until every ray is at the horizon or has found its crossing; those that have.
+    ///
+    /// Steps that are surely safe are short where the bound is much greater than the slope's true change. So the density is
+    /// asked for farther ahead, at a guess of the crossing; what lies between may be proven empty from there as well.
     #[inline(always)]
     fn advance(&self, active: &ActiveBalls, state: &mut State<S>, horizon: f32) -> S::Mask {
         let simd = self.simd;
@@ -334,55 +397,50 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         // Where all balls together are too weak there is no crossing.
         let is_empty = is_outside & state.bounds.density.lt(isovalue);
         state.t = state.t.max(horizon).select(is_empty & state.searching, state.t);
-        let bend = state.bounds.rise.select(is_outside, state.bounds.fall);
+        let bend = Bend::new(simd, state.bounds.rise.select(is_outside, state.bounds.fall));
         let bend_range = (state.bounds.rise + state.bounds.fall) * simd.splat(0.5);
         let tolerance = simd.splat(TOLERANCE * self.isovalue);
+        let step_tolerance = simd.splat(STEP_TOLERANCE * self.isovalue);
         let least_of_radius = simd.splat(LEAST_STEP * active.least_radius);
         let mut found = simd.mask(0);
+        let mut at = state.t;
         loop {
             let walking = state.searching & !found & state.t.lt(horizon);
             if !walking.any() {
                 return found;
             }
-            let (density, slope) = self.evaluate(active, state.t);
-            let gap = (isovalue - density) * state.side;
-            let slope = slope * state.side;
-            let gap = gap.max(zero);
+            let (density, slope) = self.evaluate(active, at);
+            let (gap, slope) = ((isovalue - density) * state.side, slope * state.side);
+            let is_proven = at.le(state.t);
+            let gap = gap.max(zero).select(is_proven, gap);
+            let steps = bend.steps(simd, gap, slope);
+            let is_proven = is_proven | (steps.is_real & (at - steps.behind).le(state.t));
             let mut limit = horizon;
-            let mut next = state.t + self.safe_step(gap, slope, bend);
+            let mut next = at + steps.ahead;
             if LOW == 1 {
                 let kinks = self.kinks(active, state);
                 limit = kinks.next.min(horizon);
                 // Across a kink only the steepest slope that may come is a bound.
-                next = next.min(limit).max(state.t + gap / kinks.steepest);
+                next = next.min(limit).max(at + gap / kinks.steepest);
             }
-            let step = next - state.t;
+            let step = next - at;
             // A step that is lost in the rounding of the distance would be made for ever.
             let least = least_of_radius.max(state.t * simd.splat(f32::EPSILON));
             // The density can miss the isovalue by no more than this after the step.
-            let is_close = (bend_range * step * step).le(tolerance) & next.lt(limit);
-            let is_there = gap.le(tolerance);
-            found = found | (walking & (is_there | is_close));
-            let moved = state.t.select(is_there, next.select(is_close, next.max(state.t + least).min(horizon)));
-            state.t = moved.select(walking, state.t);
+            let is_close = (bend_range * step * step).le(step_tolerance) & next.lt(limit);
+            let is_there = gap.max(zero - gap).le(tolerance);
+            let proven = walking & is_proven;
+            found = found | (proven & (is_there | is_close));
+            let moved = at.select(is_there, (at + steps.guess).select(is_close, next.max(state.t + least).min(horizon)));
+            state.t = moved.select(proven, state.t);
             // Where no ball gives its part there is a gap.
-            let is_in_gap = walking & !found & is_outside & density.lt(least_density);
+            let is_in_gap = proven & !found & is_outside & density.lt(least_density);
             if is_in_gap.any() {
                 state.t = self.next_possible(active, state, last).select(is_in_gap, state.t);
             }
+            let guess = (at + steps.guess).max(state.t).min(horizon);
+            at = if LOW == 1 { state.t } else { guess.select(proven & !is_in_gap, state.t) };
         }
-    }
-
-    /// The longest step that cannot pass a crossing: the positive root of `gap = slope dt + bend dt^2 / 2`.
-    #[inline(always)]
-    fn safe_step(&self, gap: S::Vector, slope: S::Vector, bend: S::Vector) -> S::Vector {
-        let (zero, two) = (self.simd.splat(0.0), self.simd.splat(2.0));
-        let root = slope.mul_add(slope, two * bend * gap).sqrt();
-        // Of the two forms of the root the one without cancellation.
-        let rises = zero.lt(slope);
-        let numerator = (two * gap).select(rises, root - slope);
-        let denominator = (slope + root).select(rises, bend);
-        numerator / denominator
     }
 
     /// F and F' at `t`.
