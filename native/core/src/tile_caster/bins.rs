@@ -11,8 +11,18 @@ use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::memory::{self, Spares};
 
-/// Pixels of a tile's side.
-pub const TILE: usize = 16;
+/// Pixels of a tile's side, as powers of two: usually, and where balls are small. Small tiles spare packets the balls of
+/// others, but hold large balls more often.
+const USUAL_TILE: u32 = 4;
+const SMALL_TILE: u32 = 3;
+/// Pixels of the greatest tile's side.
+pub const GREATEST_TILE: usize = 1 << USUAL_TILE;
+
+/// Balls count as small where they are not wider than so many pixels on average.
+const SMALL: usize = 4;
+
+/// Of so many balls one is asked for its width.
+const ASKED: usize = 64;
 
 /// Parts that the balls are divided into; each counts for itself.
 const PARTS: usize = 32;
@@ -27,6 +37,8 @@ pub struct Bins {
     starts: Vec<usize>,
     /// Front, chunk and place in it, in this order of significance.
     entries: Vec<AtomicU64>,
+    /// Pixels of a tile's side.
+    pub side: usize,
     /// Of tiles.
     pub columns: usize,
     /// Of tiles.
@@ -42,9 +54,11 @@ impl Bins {
     /// `Cancelled`, `OutOfMemory`.
     pub fn new(culled: Culled, view: &View, job: &Job) -> Result<Self> {
         let Culled { mut chunks, occlusion } = culled;
-        let (columns, rows) = (view.width.div_ceil(TILE), view.height.div_ceil(TILE));
-        let ends = occlusion.ends(TILE, [columns, rows]);
-        let grid = Grid { ends: &ends, columns };
+        let power = if are_small(&chunks) { SMALL_TILE } else { USUAL_TILE };
+        let side = 1 << power;
+        let (columns, rows) = (view.width.div_ceil(side), view.height.div_ceil(side));
+        let ends = occlusion.ends(side, [columns, rows]);
+        let grid = Grid { ends: &ends, power, columns };
         job.expect(chunks.len());
         let part_length = chunks.len().div_ceil(PARTS).max(1);
         let mut cursors = chunks
@@ -60,7 +74,7 @@ impl Bins {
         entries.resize_with(starts[columns * rows], || AtomicU64::new(0));
         let parts = chunks.par_chunks(part_length).zip(&mut cursors).enumerate();
         parts.for_each(|(part, (chunks, cursors))| grid.fill(chunks, part * part_length, cursors, &entries));
-        Ok(Self { chunks, starts, entries, columns, rows, occlusion })
+        Ok(Self { chunks, starts, entries, side, columns, rows, occlusion })
     }
 
     /// The entries of a tile, in no order; they sort by where the balls begin, then by index.
@@ -71,7 +85,7 @@ impl Bins {
 
     /// The lower left pixel of a tile.
     pub fn corner(&self, tile: usize) -> [usize; 2] {
-        [tile % self.columns * TILE, tile / self.columns * TILE]
+        [tile % self.columns * self.side, tile / self.columns * self.side]
     }
 
     /// The ball of an entry.
@@ -98,6 +112,13 @@ impl Drop for Bins {
     }
 }
 
+/// Whether balls are narrow on average, by a sample.
+fn are_small(chunks: &[Chunk]) -> bool {
+    let widths = chunks.iter().flat_map(|chunk| &chunk.balls).step_by(ASKED).map(|ball| usize::from(ball.columns[1] - ball.columns[0]));
+    let (count, sum) = widths.fold((0, 0), |(count, sum), width| (count + 1, sum + width + 1));
+    sum <= SMALL * count
+}
+
 /// Turns what the parts have counted into the places of their first entries; where each tile's entries begin, and the end.
 fn starts(parts: &mut [Vec<u32>], tiles: usize) -> Result<Vec<usize>> {
     let mut starts = memory::with_capacity(tiles + 1)?;
@@ -121,6 +142,8 @@ fn starts(parts: &mut [Vec<u32>], tiles: usize) -> Result<Vec<usize>> {
 struct Grid<'a> {
     /// For each tile, the distance behind which nothing can be seen.
     ends: &'a [f32],
+    /// Of two: pixels of a tile's side.
+    power: u32,
     columns: usize,
 }
 
@@ -158,7 +181,7 @@ impl Grid<'_> {
     /// Visits the tiles in which a ball may be seen that begins at `front`.
     #[inline(always)]
     fn for_tiles(&self, ball: &SeenBall, front: f32, mut visit: impl FnMut(usize)) {
-        let tile_of = |pixel: u16| usize::from(pixel) / TILE;
+        let tile_of = |pixel: u16| usize::from(pixel) >> self.power;
         let ([left, right], [bottom, top]) = (ball.columns.map(tile_of), ball.rows.map(tile_of));
         for row in bottom..=top {
             for tile in row * self.columns + left..=row * self.columns + right {

@@ -17,7 +17,7 @@ mod view;
 
 use rayon::prelude::*;
 
-use self::bins::{Bins, TILE};
+use self::bins::Bins;
 pub use self::image::{Attribute, Image, NO_BALL};
 use self::culling::Culled;
 use self::occlusion::CELL;
@@ -130,7 +130,8 @@ impl Task for TileTask<'_> {
     fn run<S: Simd>(mut self, simd: S) -> Result<()> {
         self.scratch.entries.fill(&self.caster.bins, self.tile)?;
         if self.scratch.entries.is_empty() {
-            self.image.put_background(self.caster.bins.corner(self.tile), TILE);
+            let bins = &self.caster.bins;
+            self.image.put_background(bins.corner(self.tile), bins.side);
             return Ok(());
         }
         match polynomial::powers(&self.caster.field.kernel) {
@@ -150,7 +151,8 @@ impl TileTask<'_> {
         let caster = self.caster;
         let kernel = Polynomial::<S, LOW, HIGH>::new(simd, &caster.field.kernel);
         let [left, bottom] = caster.bins.corner(self.tile);
-        let end = [(left + TILE).min(caster.view.width), (bottom + TILE).min(caster.view.height)];
+        let side = caster.bins.side;
+        let end = [(left + side).min(caster.view.width), (bottom + side).min(caster.view.height)];
         for y in (bottom..end[1]).step_by(CELL * self.stride) {
             for x in (left..end[0]).step_by(CELL * self.stride) {
                 let pixels = PacketPixels { x, y, stride: self.stride };

@@ -14,10 +14,13 @@ use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
 const WINDOW: f32 = 0.5;
 
 /// A window goes on until so many balls touch it.
-const WINDOW_BALLS: usize = 4;
+const WINDOW_BALLS: usize = 2;
 
 /// Rays that are touched by fewer balls than this have a bound of their own.
 const FEW: usize = 5;
+
+/// Where more balls touch a window, one of them must give so little that looking for where it does costs more than it saves.
+const FEW_ENOUGH: usize = 8;
 
 /// Share of a distance by which the first possible crossing may be nearer than float32 says.
 const FIRST_MARGIN: f32 = 5e-7;
@@ -185,25 +188,29 @@ impl<S: Simd> Bend<S> {
     /// `gap = slope dt + bend dt^2 / 2` ahead and `gap = -slope dt + bend dt^2 / 2` behind.
     #[inline(always)]
     fn steps(&self, simd: S, gap: S::Vector, slope: S::Vector) -> Steps<S> {
-        let (zero, least) = (simd.splat(0.0), simd.splat(LEAST));
+        let zero = simd.splat(0.0);
         let (shorter, longer) = (simd.splat(1.0 - 4.0 * S::ESTIMATE_ERROR), simd.splat(1.0 + 4.0 * S::ESTIMATE_ERROR));
         let gap_2 = gap + gap;
         let pull = gap_2 * self.bend;
         let rises = zero.lt(slope);
         let steepness = slope.max(zero - slope);
         // Of the two forms of the roots the one without cancellation.
-        let sum_of = |square: S::Vector| {
-            let square = square.max(least);
-            square.mul_add(square.inverse_sqrt_estimate(), steepness).max(least)
-        };
         let square = slope.mul_add(slope, pull);
-        let root_sum = sum_of(square);
+        let root_sum = Self::sum(simd, square, steepness);
         let near = gap_2 * root_sum.reciprocal_estimate();
         let near = (near * shorter).min(near * longer);
         let far = root_sum * self.inverse * shorter;
-        let guess_sum = sum_of(slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)));
+        let guess_sum = Self::sum(simd, slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)), steepness);
         let guess = gap_2 * guess_sum.reciprocal_estimate();
         Steps { ahead: near.select(rises, far), behind: far.select(rises, near), guess: guess.select(rises, zero), is_real: zero.lt(square) }
+    }
+
+    /// `sqrt(square) + steepness`, about.
+    #[inline(always)]
+    fn sum(simd: S, square: S::Vector, steepness: S::Vector) -> S::Vector {
+        let least = simd.splat(LEAST);
+        let square = square.max(least);
+        square.mul_add(square.inverse_sqrt_estimate(), steepness).max(least)
     }
 }
 
@@ -257,7 +264,7 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
     /// left.
     #[inline(always)]
     fn next_window(&mut self, active: &mut ActiveBalls, stream: &mut Stream, state: &mut State<S>) -> Option<f32> {
-        let simd = self.simd;
+        let (simd, zero) = (self.simd, self.simd.splat(0.0));
         let nearest = state.t.select(state.searching, simd.splat(f32::MAX)).reduce_min();
         let next = stream.peek(self);
         let begin = match next {
@@ -271,7 +278,12 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         self.insert(active, stream, &mut state.bounds, least, WINDOW_BALLS);
         let next_front = stream.peek(self).map_or(f32::MAX, |entry| self.entries.front(entry));
         let horizon = next_front.min(active.last_back.max(least));
-        state.t = self.next_possible(active, state, horizon);
+        // Where all balls together are too weak there is no crossing.
+        let is_empty = zero.lt(state.side) & state.bounds.density.lt(simd.splat(self.isovalue));
+        state.t = state.t.max(simd.splat(horizon)).select(is_empty, state.t);
+        if active.balls.len() <= FEW_ENOUGH && (state.searching & !is_empty).any() {
+            state.t = self.next_possible(active, state, horizon);
+        }
         Some(horizon)
     }
 
@@ -281,11 +293,13 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
     fn next_possible(&self, active: &ActiveBalls, state: &State<S>, horizon: f32) -> S::Vector {
         let simd = self.simd;
         let (zero, far) = (simd.splat(0.0), simd.splat(horizon));
+        let (least, longer) = (simd.splat(LEAST), simd.splat(1.0 + 2.0 * S::ESTIMATE_ERROR));
         let threshold = self.least_x(&state.bounds);
         let mut first = far;
         for ball in &active.balls {
             let half_chord_2 = (simd.load(&ball.peak) - threshold) * simd.splat(ball.radius * ball.radius);
-            let half_chord = half_chord_2.max(zero).sqrt();
+            // Longer rather than shorter: what begins earlier only costs time.
+            let half_chord = half_chord_2 * half_chord_2.max(least).inverse_sqrt_estimate() * longer;
             let middle = simd.load(&ball.middle);
             let is_ahead = zero.lt(half_chord_2) & state.t.lt(middle + half_chord);
             first = first.min((middle - half_chord).select(is_ahead, far));
@@ -394,9 +408,6 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         let horizon = simd.splat(horizon).min(end);
         let least_density = isovalue * simd.splat(0.99) / state.bounds.touching.max(simd.splat(1.0));
         let is_outside = zero.lt(state.side);
-        // Where all balls together are too weak there is no crossing.
-        let is_empty = is_outside & state.bounds.density.lt(isovalue);
-        state.t = state.t.max(horizon).select(is_empty & state.searching, state.t);
         let bend = Bend::new(simd, state.bounds.rise.select(is_outside, state.bounds.fall));
         let bend_range = (state.bounds.rise + state.bounds.fall) * simd.splat(0.5);
         let tolerance = simd.splat(TOLERANCE * self.isovalue);
@@ -524,8 +535,10 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         let length_2 = outward[0].mul_add(outward[0], outward[1].mul_add(outward[1], outward[2] * outward[2]));
         let scale = simd.splat(1.0) / length_2.sqrt();
         let is_level = length_2.le(zero);
-        let facing = [dx, dy, dz].map(|axis| zero - axis * state.side);
-        let normal = std::array::from_fn(|axis| facing[axis].select(is_level, outward[axis] * scale));
+        let mut normal = [dx, dy, dz];
+        for (facing, outward) in normal.iter_mut().zip(outward) {
+            *facing = (zero - *facing * state.side).select(is_level, outward * scale);
+        }
         let dominant = dominant.lanes();
         let index = |ray| self.entries.index(active.balls[dominant.0[ray] as usize].entry as usize);
         surface.put(simd, found, point[2], normal, index);

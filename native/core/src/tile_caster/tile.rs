@@ -1,6 +1,6 @@
 //! A tile of the image: its balls in the order in which they begin, its packets of rays, and where results go.
 
-use super::bins::{Bins, front_of_entry};
+use super::bins::{Bins, GREATEST_TILE, front_of_entry};
 use super::image::{Image, Pixels};
 use super::occlusion::{CELL, Occlusion};
 use super::project::{DISTANCE_ERROR, set_bits};
@@ -206,7 +206,7 @@ pub struct PixelCenters {
 impl PixelCenters {
     pub fn new(view: &View) -> Self {
         // Packets at the image's border have rays beyond it.
-        let side = |count: usize| count.next_multiple_of(super::bins::TILE) + super::bins::TILE;
+        let side = |count: usize| count.next_multiple_of(GREATEST_TILE) + GREATEST_TILE;
         Self {
             columns: (0..side(view.width)).map(|column| view.pixel_center(column, 0)[0] as f32).collect(),
             rows: (0..side(view.height)).map(|row| view.pixel_center(0, row)[1] as f32).collect(),
