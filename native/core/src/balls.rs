@@ -1,5 +1,7 @@
 //! The metaballs, borrowed from their owner.
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
 use crate::simd::LANES;
 
@@ -9,6 +11,9 @@ const GREATEST_WEIGHT: f32 = 1e15;
 
 /// Numbers that are looked at together.
 const STRETCH: usize = 256;
+
+/// Numbers that a thread takes at a time.
+const PART: usize = 1 << 16;
 
 /// A ball's weight, bounded for computing in single precision.
 #[inline(always)]
@@ -53,11 +58,14 @@ impl<'a> Balls<'a> {
     /// The greatest weight, 0 where there is none above.
     pub fn greatest_weight(&self) -> f32 {
         let greater = |a: f32, b: f32| if a > b { a } else { b };
-        let mut lanes = [0.0; LANES];
-        for weights in self.weights.chunks(LANES) {
-            lanes.iter_mut().zip(weights).for_each(|(lane, weight)| *lane = greater(*weight, *lane));
-        }
-        lanes.into_iter().fold(0.0, greater)
+        let greatest = |weights: &[f32]| {
+            let mut lanes = [0.0; LANES];
+            for weights in weights.chunks(LANES) {
+                lanes.iter_mut().zip(weights).for_each(|(lane, weight)| *lane = greater(*weight, *lane));
+            }
+            lanes.into_iter().fold(0.0, greater)
+        };
+        self.weights.par_chunks(PART).map(greatest).reduce(|| 0.0, greater)
     }
 
     /// How many there are.
@@ -87,8 +95,9 @@ impl<'a> Balls<'a> {
 }
 
 /// Whether all numbers pass a test; they are looked at in stretches, for which compilers use vectors.
-fn all(numbers: &[f32], test: impl Fn(f32) -> bool) -> bool {
-    numbers.chunks(STRETCH).all(|stretch| stretch.iter().fold(true, |passes, number| passes & test(*number)))
+fn all(numbers: &[f32], test: impl Fn(f32) -> bool + Sync) -> bool {
+    let pass = |stretch: &[f32]| stretch.iter().fold(true, |passes, number| passes & test(*number));
+    numbers.par_chunks(PART).all(|part| part.chunks(STRETCH).all(pass))
 }
 
 fn check(holds: bool, name: &str, wanted: &str) -> Result<()> {

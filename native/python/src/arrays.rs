@@ -68,14 +68,35 @@ impl<'py> FluidArrays<'py> {
         })
     }
 
+    /// The same without Python, for other threads.
+    pub fn plain(&self) -> Fluid<'_> {
+        Fluid {
+            positions: self.positions.rows(),
+            radii: self.radii.numbers(),
+            weights: self.weights.numbers(),
+            kernel: &self.kernel,
+            isovalue: self.isovalue,
+        }
+    }
+}
+
+/// What [`FluidArrays`] holds.
+pub struct Fluid<'a> {
+    positions: &'a [[f32; 3]],
+    radii: &'a [f32],
+    weights: &'a [f32],
+    kernel: &'a [f64],
+    isovalue: f64,
+}
+
+impl<'a> Fluid<'a> {
     /// The balls and their field.
     ///
     /// # Errors
-    /// ValueError where they are unusable.
-    pub fn checked(&self) -> PyResult<(Balls<'_>, Field)> {
-        let balls = Balls::new(self.positions.rows(), self.radii.numbers(), self.weights.numbers());
-        let field = Kernel::new(&self.kernel).and_then(|kernel| Field::new(kernel, self.isovalue));
-        Ok((balls.map_err(python_error)?, field.map_err(python_error)?))
+    /// `InvalidInput` where they are unusable.
+    pub fn checked(&self) -> Result<(Balls<'a>, Field)> {
+        let field = Field::new(Kernel::new(self.kernel)?, self.isovalue)?;
+        Ok((Balls::new(self.positions, self.radii, self.weights)?, field))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The class `FittedBvh` of `meniscus_native`.
 
 use meniscus_core::fitted_bvh::{FittedBvh as Bvh, Hierarchy, Node, Options, Rays};
+use meniscus_core::job::Job;
 use meniscus_core::memory;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -47,9 +48,12 @@ impl FittedBvh {
         let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
         let hierarchy = if overlapping { Hierarchy::Overlapping } else { Hierarchy::Fitted };
         let options = Options { hierarchy, fits, tightens, discards, proves };
-        let (balls, field) = fluid.checked()?;
-        let bvh = run(python, threads, watch, |job| Bvh::build(&balls, &field, &options, job))?;
-        Ok(Self { bvh })
+        let fluid = fluid.plain();
+        let build = |job: &Job| {
+            let (balls, field) = fluid.checked()?;
+            Bvh::build(&balls, &field, &options, job)
+        };
+        Ok(Self { bvh: run(python, threads, watch, build)? })
     }
 
     /// Where rays first cross the surface, either way: t float64 (N,), infinite where they do not; normals float32 (N, 3),

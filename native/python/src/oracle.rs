@@ -35,9 +35,12 @@ pub fn oracle_cast<'py>(
 ) -> PyResult<(Column<'py, f64>, Bound<'py, PyArray2<f64>>)> {
     let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
     let (origins, directions) = (Rows::borrow("origins", origins)?, Rows::borrow("directions", directions)?);
-    let (balls, field) = fluid.checked()?;
+    let fluid = fluid.plain();
     let rays = Rays::new(origins.rows(), directions.rows()).map_err(python_error)?;
-    let first = run(python, threads, watch, |job: &Job| cast(balls, field, rays, job))?;
+    let first = run(python, threads, watch, |job: &Job| {
+        let (balls, field) = fluid.checked()?;
+        cast(balls, field, rays, job)
+    })?;
     let normals = first.normals.into_flattened().into_pyarray(python).reshape([rays.len(), 3])?;
     Ok((first.t.into_pyarray(python), normals))
 }
@@ -63,8 +66,11 @@ pub fn oracle_crossings<'py>(
 ) -> PyResult<(Column<'py, i64>, Column<'py, f64>, Column<'py, bool>)> {
     let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
     let (origins, directions) = (Rows::borrow("origins", origins)?, Rows::borrow("directions", directions)?);
-    let (balls, field) = fluid.checked()?;
+    let fluid = fluid.plain();
     let rays = Rays::new(origins.rows(), directions.rows()).map_err(python_error)?;
-    let all = run(python, threads, watch, |job: &Job| crossings(balls, field, rays, job))?;
+    let all = run(python, threads, watch, |job: &Job| {
+        let (balls, field) = fluid.checked()?;
+        crossings(balls, field, rays, job)
+    })?;
     Ok((all.rays.into_pyarray(python), all.t.into_pyarray(python), all.is_entering.into_pyarray(python)))
 }

@@ -1,5 +1,6 @@
 //! `TileCaster`: what a camera sees.
 
+use meniscus_core::job::Job;
 use meniscus_core::simd::Path;
 use meniscus_core::tile_caster::{self, Attribute, Image, View};
 use pyo3::prelude::*;
@@ -43,8 +44,12 @@ impl TileCaster {
         let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
         let view = View { camera_from_world, eye, window, is_perspective, width, height, clip };
         let path = Path::chosen().map_err(python_error)?;
-        let (balls, field) = fluid.checked()?;
-        run(python, threads, watch, |job| tile_caster::TileCaster::new(path, &balls, &field, &view, job)).map(Self)
+        let fluid = fluid.plain();
+        let build = |job: &Job| {
+            let (balls, field) = fluid.checked()?;
+            tile_caster::TileCaster::new(path, &balls, &field, &view, job)
+        };
+        run(python, threads, watch, build).map(Self)
     }
 
     /// Cast every stride-th pixel (4, 2 or 1) along both axes and fill the pixels between.

@@ -19,7 +19,7 @@ const SMALL_TILE: u32 = 3;
 pub const GREATEST_TILE: usize = 1 << USUAL_TILE;
 
 /// Balls count as small where they are not wider than so many pixels on average.
-const SMALL: usize = 4;
+const SMALL: usize = 3;
 
 /// Of so many balls one is asked for its width.
 const ASKED: usize = 64;

@@ -32,6 +32,9 @@ const TOLERANCE: f32 = 2e-6;
 /// bound of the slope's change; the guess itself is several times better.
 const STEP_TOLERANCE: f32 = 8e-6;
 
+/// Nor farther off than this share of a radius, which matters at silhouettes, where the density is nearly level.
+const STEP_SHARE: f32 = 1e-5;
+
 /// The least step, in radii of the least ball: only where a ray grazes the surface would steps be shorter.
 const LEAST_STEP: f32 = 1e-5;
 
@@ -174,6 +177,9 @@ struct Steps<S: Simd> {
     behind: S::Vector,
     /// Where the crossing is, about.
     guess: S::Vector,
+    /// The slope at the crossing is at least half of this, about.
+    slope: S::Vector,
+    /// Whether there are such roots.
     is_real: S::Mask,
 }
 
@@ -202,7 +208,7 @@ impl<S: Simd> Bend<S> {
         let far = root_sum * self.inverse * shorter;
         let guess_sum = Self::sum(simd, slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)), steepness);
         let guess = gap_2 * guess_sum.reciprocal_estimate();
-        Steps { ahead: near.select(rises, far), behind: far.select(rises, near), guess: guess.select(rises, zero), is_real: zero.lt(square) }
+        Steps { ahead: near.select(rises, far), behind: far.select(rises, near), guess: guess.select(rises, zero), slope: root_sum, is_real: zero.lt(square) }
     }
 
     /// `sqrt(square) + steepness`, about.
@@ -412,6 +418,7 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         let bend_range = (state.bounds.rise + state.bounds.fall) * simd.splat(0.5);
         let tolerance = simd.splat(TOLERANCE * self.isovalue);
         let step_tolerance = simd.splat(STEP_TOLERANCE * self.isovalue);
+        let farthest = simd.splat(STEP_SHARE * active.least_radius);
         let least_of_radius = simd.splat(LEAST_STEP * active.least_radius);
         let mut found = simd.mask(0);
         let mut at = state.t;
@@ -437,8 +444,8 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
             let step = next - at;
             // A step that is lost in the rounding of the distance would be made for ever.
             let least = least_of_radius.max(state.t * simd.splat(f32::EPSILON));
-            // The density can miss the isovalue by no more than this after the step.
-            let is_close = (bend_range * step * step).le(step_tolerance) & next.lt(limit);
+            // The density can miss the isovalue by no more than this after the step, and the distance by that over the slope.
+            let is_close = (bend_range * step * step).le(step_tolerance.min(steps.slope * farthest)) & next.lt(limit);
             let is_there = gap.max(zero - gap).le(tolerance);
             let proven = walking & is_proven;
             found = found | (proven & (is_there | is_close));

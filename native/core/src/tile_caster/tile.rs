@@ -279,7 +279,8 @@ impl Rays {
         } else {
             ([zero, zero, one], [across, up], simd.splat(1.0))
         };
-        let [start, end] = view.clip.map(|clip| (stretch * simd.splat(clip as f32)).lanes());
+        let start = (stretch * simd.splat(view.clip[0] as f32)).lanes();
+        let end = (stretch * simd.splat(view.clip[1] as f32)).lanes();
         let visible_end = occlusion.end([pixels.x, pixels.y], [CELL * pixels.stride; 2]);
         let bundle = Bundle::around(&direction, &origin);
         Self { direction, origin, start, end, lanes, visible_end, bundle }
