@@ -24,8 +24,10 @@ const SMALL: usize = 3;
 /// Of so many balls one is asked for its width.
 const ASKED: usize = 64;
 
-/// Parts that the balls are divided into; each counts for itself.
-const PARTS: usize = 32;
+/// Parts that the balls are divided into for each thread, and in all; each counts for itself. The entries are in the same
+/// order for any number.
+const PARTS_A_THREAD: usize = 4;
+const MOST_PARTS: usize = 32;
 
 /// Memory for the entries.
 static ENTRIES: Spares<AtomicU64> = Spares::new();
@@ -33,6 +35,8 @@ static ENTRIES: Spares<AtomicU64> = Spares::new();
 /// The balls of each tile, in no order.
 pub struct Bins {
     chunks: Vec<Chunk>,
+    /// Whether most balls are only a few pixels wide.
+    pub are_small: bool,
     /// Where each tile's entries begin, and where the last one's end.
     starts: Vec<usize>,
     /// Front, chunk and place in it, in this order of significance.
@@ -54,13 +58,15 @@ impl Bins {
     /// `Cancelled`, `OutOfMemory`.
     pub fn new(culled: Culled, view: &View, job: &Job) -> Result<Self> {
         let Culled { mut chunks, occlusion } = culled;
-        let power = if are_small(&chunks) { SMALL_TILE } else { USUAL_TILE };
+        let are_small = are_small(&chunks);
+        let power = if are_small { SMALL_TILE } else { USUAL_TILE };
         let side = 1 << power;
         let (columns, rows) = (view.width.div_ceil(side), view.height.div_ceil(side));
         let ends = occlusion.ends(side, [columns, rows]);
         let grid = Grid { ends: &ends, power, columns };
         job.expect(chunks.len());
-        let part_length = chunks.len().div_ceil(PARTS).max(1);
+        let parts = (PARTS_A_THREAD * rayon::current_num_threads()).min(MOST_PARTS);
+        let part_length = chunks.len().div_ceil(parts).max(1);
         let mut cursors = chunks
             .par_chunks_mut(part_length)
             .map(|part| {
@@ -74,7 +80,7 @@ impl Bins {
         entries.resize_with(starts[columns * rows], || AtomicU64::new(0));
         let parts = chunks.par_chunks(part_length).zip(&mut cursors).enumerate();
         parts.for_each(|(part, (chunks, cursors))| grid.fill(chunks, part * part_length, cursors, &entries));
-        Ok(Self { chunks, starts, entries, side, columns, rows, occlusion })
+        Ok(Self { chunks, are_small, starts, entries, side, columns, rows, occlusion })
     }
 
     /// The entries of a tile, in no order; they sort by where the balls begin, then by index.

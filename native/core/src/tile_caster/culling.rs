@@ -20,7 +20,7 @@ use crate::simd::{LANES, Mask, Path, Simd, Task, Vector};
 pub const CHUNK: usize = 4096;
 
 /// Of so many groups of sixteen balls, one is drawn before all others; one number after the other.
-const SAMPLES: [usize; 2] = [16, 4];
+const SAMPLES: [usize; 2] = [32, 4];
 
 /// A ball that may be seen, in camera space.
 #[derive(Clone, Copy, Debug)]

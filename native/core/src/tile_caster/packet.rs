@@ -16,6 +16,9 @@ const WINDOW: f32 = 0.5;
 /// A window goes on until so many balls touch it.
 const WINDOW_BALLS: usize = 2;
 
+/// The same where balls are so small that each meets few of the rays.
+const WINDOW_SMALL_BALLS: usize = 4;
+
 /// Rays that are touched by fewer balls than this have a bound of their own.
 const FEW: usize = 5;
 
@@ -281,7 +284,8 @@ impl<S: Simd, const LOW: usize, const HIGH: usize> Walk<'_, S, LOW, HIGH> {
         state.t = state.t.max(simd.splat(begin));
         // Beyond `begin` also where the radius is lost in its rounding: the next ball must be taken in.
         let least = next.map_or(begin, |entry| (begin + WINDOW * self.entries.radius(entry)).max(begin.next_up()));
-        self.insert(active, stream, &mut state.bounds, least, WINDOW_BALLS);
+        let count = if self.bins.are_small { WINDOW_SMALL_BALLS } else { WINDOW_BALLS };
+        self.insert(active, stream, &mut state.bounds, least, count);
         let next_front = stream.peek(self).map_or(f32::MAX, |entry| self.entries.front(entry));
         let horizon = next_front.min(active.last_back.max(least));
         // Where all balls together are too weak there is no crossing.
