@@ -50,7 +50,7 @@ pub fn reserve<T>(vector: &mut Vec<T>, count: usize) -> Result<()> {
 const MOST_SPARE: usize = 64 << 20;
 
 /// Vectors that are done with, for the next frame: to get fresh memory from the system takes longer than to fill it.
-pub struct Spares<T>(Mutex<Vec<Vec<T>>>);
+pub(crate) struct Spares<T>(Mutex<Vec<Vec<T>>>);
 
 impl<T> Spares<T> {
     /// None yet.
@@ -68,7 +68,8 @@ impl<T> Spares<T> {
         vector.clear();
         let mut vectors = self.vectors();
         let held: usize = vectors.iter().map(|vector| vector.capacity() * size_of::<T>()).sum();
-        if held + vector.capacity() * size_of::<T>() <= MOST_SPARE {
+        let is_wanted = held + vector.capacity() * size_of::<T>() <= MOST_SPARE;
+        if is_wanted && vectors.try_reserve(1).is_ok() {
             vectors.push(vector);
         }
     }

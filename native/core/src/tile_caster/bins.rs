@@ -29,6 +29,9 @@ const ASKED: usize = 64;
 const PARTS_A_THREAD: usize = 4;
 const MOST_PARTS: usize = 32;
 
+/// How often all chunks are gone through.
+pub const PASSES: usize = 2;
+
 /// Memory for the entries.
 static ENTRIES: Spares<AtomicU64> = Spares::new();
 
@@ -64,7 +67,6 @@ impl Bins {
         let (columns, rows) = (view.width.div_ceil(side), view.height.div_ceil(side));
         let ends = occlusion.ends(side, [columns, rows]);
         let grid = Grid { ends: &ends, power, columns };
-        job.expect(chunks.len());
         let parts = (PARTS_A_THREAD * rayon::current_num_threads()).min(MOST_PARTS);
         let part_length = chunks.len().div_ceil(parts).max(1);
         let mut cursors = chunks
@@ -79,7 +81,11 @@ impl Bins {
         memory::reserve(&mut entries, starts[columns * rows])?;
         entries.resize_with(starts[columns * rows], || AtomicU64::new(0));
         let parts = chunks.par_chunks(part_length).zip(&mut cursors).enumerate();
-        parts.for_each(|(part, (chunks, cursors))| grid.fill(chunks, part * part_length, cursors, &entries));
+        parts.try_for_each(|(part, (chunks, cursors))| {
+            job.advance(chunks.len())?;
+            grid.fill(chunks, part * part_length, cursors, &entries);
+            Ok(())
+        })?;
         Ok(Self { chunks, are_small, starts, entries, side, columns, rows, occlusion })
     }
 
@@ -120,7 +126,8 @@ impl Drop for Bins {
 
 /// Whether balls are narrow on average, by a sample.
 fn are_small(chunks: &[Chunk]) -> bool {
-    let widths = chunks.iter().flat_map(|chunk| &chunk.balls).step_by(ASKED).map(|ball| usize::from(ball.columns[1] - ball.columns[0]));
+    let widths =
+        chunks.iter().flat_map(|chunk| &chunk.balls).step_by(ASKED).map(|ball| usize::from(ball.columns[1] - ball.columns[0]));
     let (count, sum) = widths.fold((0, 0), |(count, sum), width| (count + 1, sum + width + 1));
     sum <= SMALL * count
 }

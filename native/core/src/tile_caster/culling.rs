@@ -22,6 +22,9 @@ pub const CHUNK: usize = 4096;
 /// Of so many groups of sixteen balls, one is drawn before all others; one number after the other.
 const SAMPLES: [usize; 2] = [32, 4];
 
+/// How often all chunks are gone through.
+pub const PASSES: usize = SAMPLES.len() + 1;
+
 /// A ball that may be seen, in camera space.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
@@ -41,10 +44,13 @@ pub struct SeenBall {
 }
 
 /// The balls of a chunk that may be seen.
+#[derive(Default)]
 pub struct Chunk {
     pub balls: Vec<SeenBall>,
     /// Distances before which no ray meets their influence spheres.
     pub fronts: Vec<f32>,
+    /// The rectangles of cells (first and last column, first and last row) in which kernel spheres prove nothing.
+    open: Vec<[u16; 4]>,
 }
 
 /// Memory for the chunks.
@@ -52,8 +58,9 @@ static BALLS: Spares<SeenBall> = Spares::new();
 static FRONTS: Spares<f32> = Spares::new();
 
 impl Chunk {
-    fn new() -> Self {
-        Self { balls: BALLS.take(), fronts: FRONTS.take() }
+    /// Takes memory that was used before.
+    fn begin(&mut self) {
+        (self.balls, self.fronts) = (BALLS.take(), FRONTS.take());
     }
 
     /// Keeps the balls for which `is_kept`, given a ball and its front.
@@ -100,18 +107,24 @@ impl Culled {
             search.draw_sample(&cells, &known, step)?;
             known = cells.occlusion()?;
         }
-        let mut known = Hidden::new(known);
-        let Kept { mut chunks, open } = search.keep(&known, Some(&cells))?;
+        let mut known = Hidden::new(known)?;
+        let mut chunks = search.keep(&known, Some(&cells))?;
         let mut occlusion = cells.occlusion()?;
-        occlusion.open(&open);
-        if known.cells.open(&open) {
+        occlusion.open(open_of(&chunks));
+        if known.cells.open(open_of(&chunks)) {
             // Some balls were left out behind what hides nothing.
-            known = Hidden::new(occlusion);
-            chunks = search.keep(&known, None)?.chunks;
+            known = Hidden::new(occlusion)?;
+            job.expect(search.chunk_count());
+            chunks = search.keep(&known, None)?;
             occlusion = known.cells;
         }
         Ok(Self { chunks, occlusion })
     }
+}
+
+/// The rectangles of cells in which kernel spheres prove nothing.
+fn open_of(chunks: &[Chunk]) -> impl Iterator<Item = [u16; 4]> {
+    chunks.iter().flat_map(|chunk| chunk.open.iter().copied())
 }
 
 /// What all chunks share.
@@ -123,34 +136,30 @@ struct Search<'a> {
     job: &'a Job,
 }
 
-/// The balls that are not left out, and the rectangles of cells in which kernel spheres prove nothing.
-struct Kept {
-    chunks: Vec<Chunk>,
-    open: Vec<[u16; 4]>,
-}
-
 impl Search<'_> {
     /// Draws the kernel spheres of every `step`-th group of balls, as far as they are not behind what is `known`.
     fn draw_sample(&self, cells: &Cells<'_>, known: &Occlusion, step: usize) -> Result<()> {
-        self.for_chunks(|chunk| Ok(self.path.dispatch(SampleTask { search: self, cells, known, chunk, step }))).map(|_| ())
+        (0..self.chunk_count()).into_par_iter().try_for_each(|number| {
+            self.job.advance(1)?;
+            self.path.dispatch(SampleTask { search: self, cells, known, number, step });
+            Ok(())
+        })
     }
 
     /// Leaves out what is outside the image or `hidden`, and draws the kernel spheres of the rest.
-    fn keep(&self, hidden: &Hidden, cells: Option<&Cells<'_>>) -> Result<Kept> {
-        let kept = self.for_chunks(|chunk| self.path.dispatch(KeepTask { search: self, hidden, cells, chunk }))?;
-        let (chunks, open): (_, Vec<_>) = kept.into_iter().unzip();
-        Ok(Kept { chunks, open: open.concat() })
+    fn keep(&self, hidden: &Hidden, cells: Option<&Cells<'_>>) -> Result<Vec<Chunk>> {
+        let count = self.chunk_count();
+        let mut chunks = memory::with_capacity(count)?;
+        chunks.resize_with(count, Chunk::default);
+        chunks.par_iter_mut().enumerate().try_for_each(|(number, chunk)| {
+            self.job.advance(1)?;
+            self.path.dispatch(KeepTask { search: self, hidden, cells, number, chunk })
+        })?;
+        Ok(chunks)
     }
 
-    /// Does something for each chunk of the balls, on all threads.
-    fn for_chunks<T: Send>(&self, work: impl Fn(usize) -> Result<T> + Sync) -> Result<Vec<T>> {
-        let chunks = self.balls.len().div_ceil(CHUNK);
-        self.job.expect(chunks);
-        let work = |chunk| {
-            self.job.advance(1)?;
-            work(chunk)
-        };
-        (0..chunks).into_par_iter().map(work).collect()
+    fn chunk_count(&self) -> usize {
+        self.balls.len().div_ceil(CHUNK)
     }
 
     /// The first balls of each group of sixteen of a chunk, of every `step`-th group, and how many there are.
@@ -175,7 +184,7 @@ struct SampleTask<'a> {
     search: &'a Search<'a>,
     cells: &'a Cells<'a>,
     known: &'a Occlusion,
-    chunk: usize,
+    number: usize,
     step: usize,
 }
 
@@ -185,7 +194,7 @@ impl Task for SampleTask<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Search { balls, projector, .. } = self.search;
-        for (first, count) in self.search.groups(self.chunk, self.step) {
+        for (first, count) in self.search.groups(self.number, self.step) {
             let projected = projector.project(simd, balls, first);
             self.cells.draw(simd, &projected, lowest_bits(count), self.known);
         }
@@ -197,22 +206,24 @@ struct KeepTask<'a> {
     search: &'a Search<'a>,
     hidden: &'a Hidden,
     cells: Option<&'a Cells<'a>>,
-    chunk: usize,
+    number: usize,
+    chunk: &'a mut Chunk,
 }
 
 impl Task for KeepTask<'_> {
-    /// The balls, and the rectangles of cells in which kernel spheres prove nothing.
-    type Output = Result<(Chunk, Vec<[u16; 4]>)>;
+    type Output = Result<()>;
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
+    fn run<S: Simd>(self, simd: S) -> Result<()> {
         let Search { balls, projector, .. } = self.search;
-        let (mut kept, mut open) = (Chunk::new(), Vec::new());
-        for (first, count) in self.search.groups(self.chunk, 1) {
+        let kept = self.chunk;
+        kept.begin();
+        for (first, count) in self.search.groups(self.number, 1) {
             let projected = projector.project(simd, balls, first);
             let (rectangles, seen) = projector.rectangles(simd, &projected, count);
             for lane in set_bits(seen & self.search.opening(simd, &projected)) {
-                open.push(rectangles.pixels(lane).map(|pixel| pixel / CELL as u16));
+                memory::reserve(&mut kept.open, 1)?;
+                kept.open.push(rectangles.pixels(lane).map(|pixel| pixel / CELL as u16));
             }
             if seen == 0 {
                 continue;
@@ -232,7 +243,7 @@ impl Task for KeepTask<'_> {
             front.compress(visible, &mut fronts);
             kept.fronts.extend_from_slice(&fronts[..visible.count_ones() as usize]);
         }
-        Ok((kept, open))
+        Ok(())
     }
 }
 
@@ -256,7 +267,7 @@ struct Hidden {
 }
 
 impl Hidden {
-    fn new(cells: Occlusion) -> Self {
-        Self { pyramid: Pyramid::new(&cells), cells }
+    fn new(cells: Occlusion) -> Result<Self> {
+        Ok(Self { pyramid: Pyramid::new(&cells)?, cells })
     }
 }

@@ -18,8 +18,8 @@ mod view;
 use rayon::prelude::*;
 
 use self::bins::Bins;
-pub use self::image::{Attribute, Image, NO_BALL};
 use self::culling::Culled;
+pub use self::image::{Attribute, Image, NO_BALL};
 use self::occlusion::CELL;
 use self::packet::{ActiveBalls, Thresholds, Walk};
 use self::polynomial::Polynomial;
@@ -52,6 +52,7 @@ impl TileCaster {
     /// `InvalidInput` for an unusable view, `Cancelled`, `OutOfMemory`.
     pub fn new(path: Path, balls: &Balls<'_>, field: &Field, view: &View, job: &Job) -> Result<Self> {
         view.check()?;
+        job.expect((culling::PASSES + bins::PASSES) * balls.len().div_ceil(culling::CHUNK));
         let thresholds = Thresholds::new(field, balls.greatest_weight());
         let bins = Bins::new(Culled::new(path, balls, field, view, job)?, view, job)?;
         Ok(Self {

@@ -2,6 +2,8 @@
 //! at which every one of its rays has surely met the surface. What begins farther away cannot be seen.
 
 use super::project::{Rectangles, whole_numbers};
+use crate::error::Result;
+use crate::memory;
 use crate::simd::{Lanes, Simd, Vector};
 
 /// Levels of a pyramid; larger rectangles are looked up nowhere.
@@ -23,9 +25,9 @@ impl Occlusion {
     }
 
     /// Forgets what is known of rectangles of cells (first and last column, first and last row); whether something was.
-    pub fn open(&mut self, rectangles: &[[u16; 4]]) -> bool {
+    pub fn open(&mut self, rectangles: impl Iterator<Item = [u16; 4]>) -> bool {
         let mut was_known = false;
-        for [x_min, x_max, y_min, y_max] in rectangles.iter().map(|rectangle| rectangle.map(usize::from)) {
+        for [x_min, x_max, y_min, y_max] in rectangles.map(|rectangle| rectangle.map(usize::from)) {
             for row in y_min..=y_max {
                 let cells = &mut self.distances[row * self.columns..][x_min..=x_max];
                 was_known |= cells.iter().any(|distance| distance.is_finite());
@@ -67,16 +69,21 @@ struct Level {
 }
 
 impl Pyramid {
-    pub fn new(occlusion: &Occlusion) -> Self {
+    /// The pyramid over cells.
+    ///
+    /// # Errors
+    /// `OutOfMemory`.
+    pub fn new(occlusion: &Occlusion) -> Result<Self> {
         let (mut columns, mut rows) = (occlusion.columns, occlusion.rows);
-        let mut squares = occlusion.distances.clone();
-        let mut levels = Vec::new();
-        for _ in 0..LEVELS {
-            levels.push(Level { ends: greatest_of_four(&squares, [columns, rows], 1), columns });
-            squares = greatest_of_four(&squares, [columns, rows], 2);
+        let mut levels = Vec::with_capacity(LEVELS);
+        levels.push(Level { ends: greatest_of_four(&occlusion.distances, [columns, rows], 1)?, columns });
+        let mut squares = greatest_of_four(&occlusion.distances, [columns, rows], 2)?;
+        for _ in 1..LEVELS {
             (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+            levels.push(Level { ends: greatest_of_four(&squares, [columns, rows], 1)?, columns });
+            squares = greatest_of_four(&squares, [columns, rows], 2)?;
         }
-        Self { levels }
+        Ok(Self { levels })
     }
 
     /// Distances behind which no pixel of those of sixteen rectangles that are in `lanes` sees anything.
@@ -106,8 +113,8 @@ fn look_up<S: Simd>(simd: S, squares: &[f32], column: S::Vector, row: S::Vector,
 }
 
 /// The greatest of every `step`-th square and its neighbours to the right, above and to the right above.
-fn greatest_of_four(squares: &[f32], [columns, rows]: [usize; 2], step: usize) -> Vec<f32> {
-    let mut greatest = Vec::with_capacity(columns.div_ceil(step) * rows.div_ceil(step));
+fn greatest_of_four(squares: &[f32], [columns, rows]: [usize; 2], step: usize) -> Result<Vec<f32>> {
+    let mut greatest = memory::with_capacity(columns.div_ceil(step) * rows.div_ceil(step))?;
     for y in (0..rows).step_by(step) {
         let (row, above) = (&squares[y * columns..][..columns], &squares[(y + 1).min(rows - 1) * columns..][..columns]);
         greatest.extend((0..columns).step_by(step).map(|x| {
@@ -115,5 +122,5 @@ fn greatest_of_four(squares: &[f32], [columns, rows]: [usize; 2], step: usize) -
             row[x].max(row[right]).max(above[x].max(above[right]))
         }));
     }
-    greatest
+    Ok(greatest)
 }

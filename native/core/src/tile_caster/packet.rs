@@ -211,7 +211,13 @@ impl<S: Simd> Bend<S> {
         let far = root_sum * self.inverse * shorter;
         let guess_sum = Self::sum(simd, slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)), steepness);
         let guess = gap_2 * guess_sum.reciprocal_estimate();
-        Steps { ahead: near.select(rises, far), behind: far.select(rises, near), guess: guess.select(rises, zero), slope: root_sum, is_real: zero.lt(square) }
+        Steps {
+            ahead: near.select(rises, far),
+            behind: far.select(rises, near),
+            guess: guess.select(rises, zero),
+            slope: root_sum,
+            is_real: zero.lt(square),
+        }
     }
 
     /// `sqrt(square) + steepness`, about.

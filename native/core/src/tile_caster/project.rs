@@ -152,17 +152,14 @@ impl Projector {
 #[inline(always)]
 fn sixteen(balls: &Balls<'_>, first: usize) -> ([[f32; 3]; LANES], Lanes, Lanes) {
     let (positions, radii, weights) = (&balls.positions()[first..], &balls.radii()[first..], &balls.weights()[first..]);
-    if let (Some(positions), Some(radii), Some(weights)) =
-        (positions.first_chunk(), radii.first_chunk(), weights.first_chunk())
+    if let (Some(positions), Some(radii), Some(weights)) = (positions.first_chunk(), radii.first_chunk(), weights.first_chunk())
     {
         return (*positions, Lanes(*radii), Lanes(*weights));
     }
-    let (mut sixteen, mut radius, mut weight) = ([[0.0; 3]; LANES], Lanes::splat(0.0), Lanes::splat(0.0));
-    for lane in 0..LANES {
-        let index = lane.min(radii.len() - 1);
-        (sixteen[lane], radius.0[lane], weight.0[lane]) = (positions[index], radii[index], weights[index]);
-    }
-    (sixteen, radius, weight)
+    let last = radii.len() - 1;
+    let position = std::array::from_fn(|lane| positions[lane.min(last)]);
+    let number = |numbers: &[f32]| Lanes(std::array::from_fn(|lane| numbers[lane.min(last)]));
+    (position, number(radii), number(weights))
 }
 
 /// The lowest `count` bits of sixteen.
