@@ -174,3 +174,6 @@ impl TileTask<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
