@@ -12,6 +12,7 @@ mod occlusion;
 mod packet;
 mod polynomial;
 mod project;
+mod steps;
 mod tile;
 mod view;
 

@@ -124,3 +124,64 @@ fn greatest_of_four(squares: &[f32], [columns, rows]: [usize; 2], step: usize) -
     }
     Ok(greatest)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::simd::{LANES, Path, Task};
+
+    struct EndsTask<'a> {
+        pyramid: &'a Pyramid,
+        rectangles: &'a Rectangles,
+        lanes: u16,
+    }
+
+    impl Task for EndsTask<'_> {
+        type Output = Lanes;
+
+        fn run<S: Simd>(self, simd: S) -> Lanes {
+            self.pyramid.ends(simd, self.rectangles, self.lanes).lanes()
+        }
+    }
+
+    const CELLS: [usize; 2] = [37, 22];
+
+    /// First and last pixel of a rectangle along an axis.
+    fn any_side(cells: usize) -> impl Strategy<Value = [u16; 2]> {
+        let last = (cells * CELL - 1) as u16;
+        (0..=last, 0..=last, 1..100u16).prop_map(|(a, b, part)| {
+            let side = a.abs_diff(b) / part;
+            [a.min(b), a.min(b) + side]
+        })
+    }
+
+    proptest! {
+        /// What is hidden behind a rectangle's squares is hidden behind each of its cells.
+        #[test]
+        fn no_cell_of_a_rectangle_ends_later(
+            distances in prop::collection::vec(1.0..100.0f32, CELLS[0] * CELLS[1]),
+            sides in prop::collection::vec((any_side(CELLS[0]), any_side(CELLS[1])), LANES),
+            lanes in any::<u16>(),
+        ) {
+            let occlusion = Occlusion::new(distances, CELLS[0], CELLS[1]);
+            let pyramid = Pyramid::new(&occlusion).expect("memory");
+            let lane_of = |side: &dyn Fn(&([u16; 2], [u16; 2])) -> u16| Lanes(std::array::from_fn(|lane| f32::from(side(&sides[lane]))));
+            let rectangles = Rectangles {
+                x_min: lane_of(&|(x, _)| x[0]),
+                x_max: lane_of(&|(x, _)| x[1]),
+                y_min: lane_of(&|(_, y)| y[0]),
+                y_max: lane_of(&|(_, y)| y[1]),
+            };
+            for path in Path::available() {
+                let ends = path.dispatch(EndsTask { pyramid: &pyramid, rectangles: &rectangles, lanes });
+                for (lane, (x, y)) in sides.iter().enumerate().filter(|(lane, _)| lanes >> lane & 1 == 1) {
+                    let corner = [x[0], y[0]].map(|pixel| usize::from(pixel) / CELL * CELL);
+                    let size = [usize::from(x[1]) + 1 - corner[0], usize::from(y[1]) + 1 - corner[1]];
+                    prop_assert!(occlusion.end(corner, size) <= ends.0[lane], "{x:?} {y:?}");
+                }
+            }
+        }
+    }
+}

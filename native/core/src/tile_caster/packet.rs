@@ -6,6 +6,7 @@
 
 use super::bins::Bins;
 use super::polynomial::Polynomial;
+use super::steps::{Bend, LEAST};
 use super::tile::{Entries, Rays, Surface};
 use crate::field::Field;
 use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
@@ -43,12 +44,6 @@ const LEAST_STEP: f32 = 1e-5;
 
 /// Share of a distance by which a kink may be elsewhere than float32 says.
 const KINK_MARGIN: f32 = 1e-6;
-
-/// How fast the slope rises where one has to guess, as a share of the bound.
-const GUESSED_BEND: f32 = 0.25;
-
-/// Less is nothing: the estimates of reciprocals need more.
-const LEAST: f32 = 1e-30;
 
 /// A ball that touches the window, along each ray.
 #[derive(Clone, Copy)]
@@ -164,69 +159,6 @@ struct Kinks<S: Simd> {
     next: S::Vector,
     /// No slope ahead is steeper.
     steepest: S::Vector,
-}
-
-/// A bound of how fast the slope can rise.
-struct Bend<S: Simd> {
-    bend: S::Vector,
-    inverse: S::Vector,
-}
-
-/// How far a ray may go on from where its density is known.
-struct Steps<S: Simd> {
-    /// No crossing is nearer; where the density is beyond the isovalue already, minus how far back the last one is.
-    ahead: S::Vector,
-    /// So far back the density was on the same side, but for the crossing just behind.
-    behind: S::Vector,
-    /// Where the crossing is, about.
-    guess: S::Vector,
-    /// The slope at the crossing is at least half of this, about.
-    slope: S::Vector,
-    /// Whether there are such roots.
-    is_real: S::Mask,
-}
-
-impl<S: Simd> Bend<S> {
-    #[inline(always)]
-    fn new(simd: S, bend: S::Vector) -> Self {
-        let bend = bend.max(simd.splat(LEAST));
-        Self { bend, inverse: simd.splat(1.0) / bend }
-    }
-
-    /// With `gap` to the isovalue and the slope there, the density stays on its side for the positive roots of
-    /// `gap = slope dt + bend dt^2 / 2` ahead and `gap = -slope dt + bend dt^2 / 2` behind.
-    #[inline(always)]
-    fn steps(&self, simd: S, gap: S::Vector, slope: S::Vector) -> Steps<S> {
-        let zero = simd.splat(0.0);
-        let (shorter, longer) = (simd.splat(1.0 - 4.0 * S::ESTIMATE_ERROR), simd.splat(1.0 + 4.0 * S::ESTIMATE_ERROR));
-        let gap_2 = gap + gap;
-        let pull = gap_2 * self.bend;
-        let rises = zero.lt(slope);
-        let steepness = slope.max(zero - slope);
-        // Of the two forms of the roots the one without cancellation.
-        let square = slope.mul_add(slope, pull);
-        let root_sum = Self::sum(simd, square, steepness);
-        let near = gap_2 * root_sum.reciprocal_estimate();
-        let near = (near * shorter).min(near * longer);
-        let far = root_sum * self.inverse * shorter;
-        let guess_sum = Self::sum(simd, slope.mul_add(slope, pull * simd.splat(GUESSED_BEND)), steepness);
-        let guess = gap_2 * guess_sum.reciprocal_estimate();
-        Steps {
-            ahead: near.select(rises, far),
-            behind: far.select(rises, near),
-            guess: guess.select(rises, zero),
-            slope: root_sum,
-            is_real: zero.lt(square),
-        }
-    }
-
-    /// `sqrt(square) + steepness`, about.
-    #[inline(always)]
-    fn sum(simd: S, square: S::Vector, steepness: S::Vector) -> S::Vector {
-        let least = simd.splat(LEAST);
-        let square = square.max(least);
-        square.mul_add(square.inverse_sqrt_estimate(), steepness).max(least)
-    }
 }
 
 /// Where the rays of a packet are.

@@ -71,16 +71,36 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Some scenes are faint: the density hardly exceeds the isovalue, and that where the camera looks, so most rays graze.
 fn any_scene() -> impl Strategy<Value = Scene> {
-    (any_balls(), any_view(), 0..5usize, 0.1..0.8f64).prop_map(|((positions, radii, weights), view, kernel, isovalue)| {
+    let faintness = prop_oneof![Just(None), (-3.0..0.0f64).prop_map(|power| Some(10f64.powf(power)))];
+    (any_balls(), any_view(), 0..5usize, 0.1..0.8f64, faintness).prop_map(|(balls, view, kernel, isovalue, faintness)| {
+        let (positions, radii, weights) = balls;
         let field = Field::new(kernels()[kernel].1, isovalue).expect("a field");
-        Scene { positions, radii, weights, field, view }
+        let scene = Scene { positions, radii, weights, field, view };
+        faintness.and_then(|excess| scene.faint(excess)).unwrap_or(scene)
     })
 }
 
 impl Scene {
     fn balls(&self) -> Balls<'_> {
         Balls::new(&self.positions, &self.radii, &self.weights).expect("usable balls")
+    }
+
+    /// The scene with its first ball where the camera looks, and the density there `1 + excess` isovalues.
+    fn faint(&self, excess: f64) -> Option<Self> {
+        let middle = self.positions[0];
+        let density = self.excess(middle.map(f64::from)).0 + self.field.isovalue;
+        let factor = (self.field.isovalue * (1.0 + excess) / density) as f32;
+        (density > 0.1 * self.field.isovalue).then(|| Self {
+            positions: self
+                .positions
+                .iter()
+                .map(|position| std::array::from_fn(|axis| position[axis] - middle[axis]))
+                .collect(),
+            weights: self.weights.iter().map(|weight| weight * factor).collect(),
+            ..self.clone()
+        })
     }
 
     fn depths(&self, path: Path) -> Vec<f32> {
@@ -97,7 +117,8 @@ impl Scene {
         let ray = |pixel: usize| {
             let [x, y] = self.view.pixel_center(pixel % SIZE[0], pixel / SIZE[0]);
             let across: [f64; 3] = std::array::from_fn(|axis| x * right[axis] + y * up[axis]);
-            let direction: [f64; 3] = std::array::from_fn(|axis| forward[axis] + if is_perspective { across[axis] } else { 0.0 });
+            let direction: [f64; 3] =
+                std::array::from_fn(|axis| forward[axis] + if is_perspective { across[axis] } else { 0.0 });
             let shift = if is_perspective { [0.0; 3] } else { across };
             (std::array::from_fn(|axis| eye[axis] + shift[axis] + clip[0] * direction[axis]), direction)
         };
@@ -164,7 +185,8 @@ fn check(scene: &Scene) -> TestCaseResult {
     let all = oracle::crossings(scene.balls(), scene.field, rays, &Job::default()).expect("crossings");
     for path in Path::available() {
         for (pixel, depth) in scene.depths(path).into_iter().enumerate() {
-            let (first, end) = (all.rays.partition_point(|ray| *ray < pixel as i64), all.rays.partition_point(|ray| *ray <= pixel as i64));
+            let (first, end) =
+                (all.rays.partition_point(|ray| *ray < pixel as i64), all.rays.partition_point(|ray| *ray <= pixel as i64));
             let length = directions[pixel].iter().map(|c| c * c).sum::<f64>().sqrt();
             let crossings: Vec<f64> = all.t[first..end].iter().map(|t| t / length).collect();
             let found = (depth < NOTHING).then(|| f64::from(depth) - scene.view.clip[0]);
