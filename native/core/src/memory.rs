@@ -63,12 +63,13 @@ impl<T> Spares<T> {
         self.vectors().pop().unwrap_or_default()
     }
 
-    /// Keeps a vector unless there are enough; its elements are dropped.
+    /// Keeps a vector that has room unless there are enough; its elements are dropped.
     pub fn give(&self, mut vector: Vec<T>) {
         vector.clear();
+        let bytes = |vector: &Vec<T>| vector.capacity() * size_of::<T>();
         let mut vectors = self.vectors();
-        let held: usize = vectors.iter().map(|vector| vector.capacity() * size_of::<T>()).sum();
-        let is_wanted = held + vector.capacity() * size_of::<T>() <= MOST_SPARE;
+        let held: usize = vectors.iter().map(bytes).sum();
+        let is_wanted = vector.capacity() > 0 && held + bytes(&vector) <= MOST_SPARE;
         if is_wanted && vectors.try_reserve(1).is_ok() {
             vectors.push(vector);
         }
@@ -90,5 +91,20 @@ mod tests {
         assert_eq!(filled(0u64, usize::MAX / 64), Err(Error::OutOfMemory(usize::MAX / 64 * 8)));
         assert_eq!(filled(7u8, 3), Ok(vec![7; 3]));
         assert_eq!(reserve(&mut vec![0u64], usize::MAX / 64), Err(Error::OutOfMemory(usize::MAX / 64 * 8)));
+    }
+
+    #[test]
+    fn spare_memory_is_used_again_and_bounded() {
+        let spares = Spares::new();
+        assert_eq!(spares.take().capacity(), 0);
+        let full = vec![1u64; 5];
+        let place = full.as_ptr();
+        spares.give(full);
+        let again = spares.take();
+        assert_eq!((again.as_ptr(), again.len()), (place, 0));
+        spares.give(Vec::new());
+        spares.give(Vec::with_capacity(MOST_SPARE / 8 / 2));
+        spares.give(Vec::with_capacity(MOST_SPARE / 8 * 2 / 3));
+        assert_eq!(spares.vectors().len(), 1);
     }
 }

@@ -167,13 +167,11 @@ mod tests {
         ) {
             let occlusion = Occlusion::new(distances, CELLS[0], CELLS[1]);
             let pyramid = Pyramid::new(&occlusion).expect("memory");
-            let lane_of = |side: &dyn Fn(&([u16; 2], [u16; 2])) -> u16| Lanes(std::array::from_fn(|lane| f32::from(side(&sides[lane]))));
-            let rectangles = Rectangles {
-                x_min: lane_of(&|(x, _)| x[0]),
-                x_max: lane_of(&|(x, _)| x[1]),
-                y_min: lane_of(&|(_, y)| y[0]),
-                y_max: lane_of(&|(_, y)| y[1]),
-            };
+            let pixel = |axis: usize, end: usize| Lanes(std::array::from_fn(|lane| {
+                let (x, y) = sides[lane];
+                f32::from([x, y][axis][end])
+            }));
+            let rectangles = Rectangles { x_min: pixel(0, 0), x_max: pixel(0, 1), y_min: pixel(1, 0), y_max: pixel(1, 1) };
             for path in Path::available() {
                 let ends = path.dispatch(EndsTask { pyramid: &pyramid, rectangles: &rectangles, lanes });
                 for (lane, (x, y)) in sides.iter().enumerate().filter(|(lane, _)| lanes >> lane & 1 == 1) {
