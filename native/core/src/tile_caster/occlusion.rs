@@ -1,7 +1,7 @@
 //! What kernel spheres hide (Kanamori et al. 2008, section 5.2), in a coarse depth buffer: for each cell of pixels, a distance
 //! at which every one of its rays has surely met the surface. What begins farther away cannot be seen.
 
-use super::project::{Rectangles, whole_numbers};
+use super::project::{MOST_WHOLE, Rectangles, whole_numbers};
 use crate::error::Result;
 use crate::memory;
 use crate::simd::{Lanes, Simd, Vector};
@@ -50,7 +50,7 @@ impl Occlusion {
         (0..columns * rows).map(|square| self.end([square % columns * side, square / columns * side], [side; 2])).collect()
     }
 
-    /// What is known of sixteen cells.
+    /// What is known of sixteen cells; of others for cells beyond [`MOST_WHOLE`], so it must only decide what is worth drawing.
     #[inline(always)]
     pub fn distances_at<S: Simd>(&self, simd: S, column: S::Vector, row: S::Vector) -> S::Vector {
         look_up(simd, &self.distances, column, row, self.columns)
@@ -60,6 +60,8 @@ impl Occlusion {
 /// Distances behind which nothing can be seen, for squares of 1, 2, 4 ... cells' side.
 pub struct Pyramid {
     levels: Vec<Level>,
+    /// The first level whose squares can be numbered; not 0 where an image has more than a hundred million pixels.
+    first: usize,
 }
 
 /// For each square, the greatest distance in it and its neighbours to the right, above and to the right above.
@@ -83,7 +85,8 @@ impl Pyramid {
             levels.push(Level { ends: greatest_of_four(&squares, [columns, rows], 1)?, columns });
             squares = greatest_of_four(&squares, [columns, rows], 2)?;
         }
-        Ok(Self { levels })
+        let first = levels.iter().position(|level| level.ends.len() <= MOST_WHOLE).unwrap_or(LEVELS);
+        Ok(Self { levels, first })
     }
 
     /// Distances behind which no pixel of those of sixteen rectangles that are in `lanes` sees anything.
@@ -93,7 +96,7 @@ impl Pyramid {
         let sides = (x_max - x_min).max(y_max - y_min).select(simd.mask(lanes), simd.splat(0.0));
         let cells = sides.reduce_max() as usize / CELL;
         // A side of so many cells reaches into two squares at most.
-        let level = (usize::BITS - cells.leading_zeros()) as usize;
+        let level = ((usize::BITS - cells.leading_zeros()) as usize).max(self.first);
         let Some(squares) = self.levels.get(level) else { return simd.splat(f32::INFINITY) };
         let per_square = simd.splat(1.0 / (CELL << level) as f32);
         let (column, row) = ((x_min * per_square).floor(), (y_min * per_square).floor());
@@ -155,6 +158,21 @@ mod tests {
             let side = a.abs_diff(b) / part;
             [a.min(b), a.min(b) + side]
         })
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "too many cells for Miri")]
+    fn cells_beyond_those_that_floats_can_number_are_found() {
+        let (side, corner) = (3000, [2999.0 * CELL as f32; 2]);
+        let mut distances = vec![1.0; side * side];
+        distances[side * side - 1] = 50.0;
+        let pyramid = Pyramid::new(&Occlusion::new(distances, side, side)).expect("memory");
+        let [x, y] = corner.map(Lanes::splat);
+        let rectangles = Rectangles { x_min: x, x_max: x, y_min: y, y_max: y };
+        for path in Path::available() {
+            let ends = path.dispatch(EndsTask { pyramid: &pyramid, rectangles: &rectangles, lanes: u16::MAX });
+            assert_eq!(ends, Lanes::splat(50.0));
+        }
     }
 
     proptest! {

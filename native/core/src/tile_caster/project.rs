@@ -179,10 +179,13 @@ pub fn set_bits(bits: u16) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Whole numbers from 0 to 2^23 - 1 as integers.
+/// One more than the greatest number that [`whole_numbers`] knows.
+pub const MOST_WHOLE: usize = 1 << 23;
+
+/// Whole numbers less than [`MOST_WHOLE`] as integers.
 #[inline(always)]
 pub fn whole_numbers<S: Simd>(simd: S, numbers: S::Vector) -> [usize; LANES] {
-    // Above 2^23 the last bits of a float are the whole number.
-    let shifted = (numbers + simd.splat((1 << 23) as f32)).lanes();
-    shifted.0.map(|number| (number.to_bits() & ((1 << 23) - 1)) as usize)
+    // From 2^23 on the last bits of a float are the whole number.
+    let shifted = (numbers + simd.splat(MOST_WHOLE as f32)).lanes();
+    shifted.0.map(|number| number.to_bits() as usize & (MOST_WHOLE - 1))
 }
