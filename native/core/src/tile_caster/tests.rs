@@ -7,7 +7,8 @@ use super::*;
 use crate::kernel::tests::kernels;
 use crate::oracle::{self, Rays};
 
-const SIZE: [usize; 2] = [60, 44];
+/// Not whole tiles, nor whole squares of the coarsest stride.
+const SIZE: [usize; 2] = [61, 46];
 const NOTHING: f32 = 1e10;
 
 /// Share of the isovalue that single precision may get the density wrong by.
@@ -103,11 +104,11 @@ impl Scene {
         })
     }
 
-    fn depths(&self, path: Path) -> Vec<f32> {
+    fn depths(&self, path: Path, stride: usize) -> Vec<f32> {
         let (mut depth, mut normal) = (vec![0.0; SIZE[0] * SIZE[1]], vec![0.0; 3 * SIZE[0] * SIZE[1]]);
         let caster = TileCaster::new(path, &self.balls(), &self.field, &self.view, &Job::default()).expect("a caster");
         let image = Image::new(SIZE, NOTHING, &mut depth, &mut normal, None, vec![]).expect("an image");
-        caster.cast(1, &image, &Job::default()).expect("depths");
+        caster.cast(stride, &image, &Job::default()).expect("depths");
         depth
     }
 
@@ -183,17 +184,30 @@ fn check(scene: &Scene) -> TestCaseResult {
     let (origins, directions) = scene.rays();
     let rays = Rays::new(&origins, &directions).expect("usable rays");
     let all = oracle::crossings(scene.balls(), scene.field, rays, &Job::default()).expect("crossings");
-    for path in Path::available() {
-        for (pixel, depth) in scene.depths(path).into_iter().enumerate() {
-            let (first, end) =
-                (all.rays.partition_point(|ray| *ray < pixel as i64), all.rays.partition_point(|ray| *ray <= pixel as i64));
-            let length = directions[pixel].iter().map(|c| c * c).sum::<f64>().sqrt();
-            let crossings: Vec<f64> = all.t[first..end].iter().map(|t| t / length).collect();
-            let found = (depth < NOTHING).then(|| f64::from(depth) - scene.view.clip[0]);
-            Ray { scene, origin: origins[pixel], direction: directions[pixel], crossings: &crossings, found }.check()?;
+    let crossings_of = |pixel: usize| -> Vec<f64> {
+        let [first, end] = [pixel, pixel + 1].map(|next| all.rays.partition_point(|ray| *ray < next as i64));
+        let length = directions[pixel].iter().map(|c| c * c).sum::<f64>().sqrt();
+        all.t[first..end].iter().map(|t| t / length).collect()
+    };
+    for (path, stride) in Path::available().into_iter().flat_map(|path| STRIDES.map(|stride| (path, stride))) {
+        let depths = scene.depths(path, stride);
+        for (pixel, depth) in depths.iter().enumerate() {
+            let Some(cast) = cast_pixel(pixel, stride) else { continue };
+            prop_assert_eq!(*depth, depths[cast], "a pixel is like the one of its square that is cast");
+            if pixel == cast {
+                let found = (*depth < NOTHING).then(|| f64::from(*depth) - scene.view.clip[0]);
+                let (origin, direction) = (origins[pixel], directions[pixel]);
+                Ray { scene, origin, direction, crossings: &crossings_of(pixel), found }.check()?;
+            }
         }
     }
     Ok(())
+}
+
+/// The pixel whose ray stands for a pixel, unless it lies beyond the image.
+fn cast_pixel(pixel: usize, stride: usize) -> Option<usize> {
+    let [x, y] = [pixel % SIZE[0], pixel / SIZE[0]].map(|side| side / stride * stride + stride / 2);
+    (x < SIZE[0] && y < SIZE[1]).then_some(y * SIZE[0] + x)
 }
 
 proptest! {
