@@ -178,6 +178,7 @@ mod tests {
     proptest! {
         /// What is hidden behind a rectangle's squares is hidden behind each of its cells.
         #[test]
+        #[cfg_attr(miri, ignore = "nothing unsafe on the path that Miri takes")]
         fn no_cell_of_a_rectangle_ends_later(
             distances in prop::collection::vec(1.0..100.0f32, CELLS[0] * CELLS[1]),
             sides in prop::collection::vec((any_side(CELLS[0]), any_side(CELLS[1])), LANES),
