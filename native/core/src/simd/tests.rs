@@ -120,3 +120,31 @@ fn a_path_can_be_named() {
     let message = Path::named("mmx").expect_err("there is no such path").to_string();
     assert!(message.contains("'mmx'") && message.contains("portable"), "{message}");
 }
+
+/// Numbers of every size for which estimates are promised.
+struct EstimatesTask(Lanes);
+
+impl Task for EstimatesTask {
+    /// Reciprocals, reciprocals of square roots, and how wrong they may be.
+    type Output = (Lanes, Lanes, f32);
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let numbers = simd.load(&self.0);
+        (numbers.reciprocal_estimate().lanes(), numbers.inverse_sqrt_estimate().lanes(), S::ESTIMATE_ERROR)
+    }
+}
+
+#[test]
+fn estimates_are_as_good_as_promised() {
+    for path in Path::available() {
+        for step in 0..100 {
+            let numbers = Lanes(std::array::from_fn(|lane| 10f32.powf(-30.0 + 0.6 * (step as f32 + lane as f32 / 16.0))));
+            let (reciprocals, inverse_roots, error) = path.dispatch(EstimatesTask(numbers));
+            for (lane, number) in numbers.0.map(f64::from).into_iter().enumerate() {
+                let apart =
+                    [f64::from(reciprocals.0[lane]) * number - 1.0, f64::from(inverse_roots.0[lane]) * number.sqrt() - 1.0];
+                assert!(apart.iter().all(|share| share.abs() <= f64::from(error)), "{path:?} {number}: {apart:?}");
+            }
+        }
+    }
+}

@@ -2,7 +2,7 @@
 //!
 //! With the gap `g = T - F`, the slope s and the bound M, the density stays below T for
 //! `2 g / (s + sqrt(s^2 + 2 M g))` ahead and, where it rises, for `(s + sqrt(s^2 + 2 M g)) / M` behind. Beyond the surface g is
-//! negative: then the first is how far back the surface is at most, and the second where the density was below T at last.
+//! negative: then the density was surely below T between the first and the second, counted back, and the surface lies nearer.
 
 use crate::simd::{Simd, Vector};
 
