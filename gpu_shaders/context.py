@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, TypeVar
@@ -17,7 +17,7 @@ import glcontext
 import moderngl
 
 from ..addon.fluid.errors import DeviceError
-from .glsl import Source
+from .programs import ProgramSource
 
 Result = TypeVar("Result")
 
@@ -46,7 +46,7 @@ class GpuContext:
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
-        self._programs: dict[tuple[str, str, tuple[tuple[str, object], ...]], moderngl.Program] = {}
+        self._programs: dict[ProgramSource, moderngl.Program] = {}
         self._thread.submit(self._open).result()
 
     def _open(self) -> None:
@@ -62,11 +62,11 @@ class GpuContext:
         self.gl.gc_mode = "context_gc"
         self.renderer = self.gl.info["GL_RENDERER"]
         self.version = self.gl.version_code
-        self._bind_texture = self._function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
-        self._tex_image_2d = self._function("glTexImage2D", *[ctypes.c_uint] * 8, ctypes.c_void_p)
+        self._bind_texture = self.function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
+        self._tex_image_2d = self.function("glTexImage2D", *[ctypes.c_uint] * 8, ctypes.c_void_p)
 
-    def _function(self, name: str, *arguments: type) -> Callable[..., None]:
-        """An OpenGL function that moderngl does not offer."""
+    def function(self, name: str, *arguments: type) -> Callable[..., None]:
+        """An OpenGL function that moderngl does not offer, by its argument types."""
         # On 64-bit systems, the only ones that Blender runs on, there is one calling convention.
         return ctypes.CFUNCTYPE(None, *arguments)(self._glcontext.load(name))
 
@@ -99,17 +99,20 @@ class GpuContext:
                 f"{self.version // 100}.{self.version // 10 % 10}; choose another method"
             )
 
-    def program(self, vertex: str, fragment: str, constants: Mapping[str, object]) -> moderngl.Program:
-        """The program of two shader files below gpu_shaders/, compiled once for each set of constants."""
-        key = (vertex, fragment, tuple(sorted(constants.items())))
-        if key not in self._programs:
-            sources = Source(vertex, constants), Source(fragment, constants)
+    def program(self, source: ProgramSource) -> moderngl.Program:
+        """The program, compiled once; DeviceError with file and line where the driver rejects it."""
+        if source not in self._programs:
+            stages = source.sources()
+            texts = {f"{stage}_shader": text.text for stage, text in stages.items()}
             try:
-                self._programs[key] = self.gl.program(vertex_shader=sources[0].text, fragment_shader=sources[1].text)
+                self._programs[source] = self.gl.program(**texts, varyings=source.varyings)
             except moderngl.Error as error:
-                log = sources["fragment_shader" in str(error)].explain(str(error))
-                raise DeviceError(f"The driver rejects the shaders {vertex} and {fragment}: {log}") from error
-        return self._programs[key]
+                log = str(error)
+                for stage, text in stages.items():
+                    if f"{stage}_shader" in log:
+                        log = text.explain(log)
+                raise DeviceError(f"The driver rejects the program '{source.name}': {log}") from error
+        return self._programs[source]
 
     def depth_texture(self, size: tuple[int, int]) -> moderngl.Texture:
         """A depth texture of 32-bit floats to sample plainly; moderngl's own have 24 bits, too few to order crossings."""

@@ -17,6 +17,18 @@ float kernel_derivative(float x) {
     return x <= 0.0 ? 0.0 : kernel_power(x) * (float(KERNEL_POWER) * KERNEL_LOW / x + float(KERNEL_POWER + 1) * KERNEL_HIGH);
 }
 
+// The greatest |F''| along a chord, times R^2: of x^n it is 2 for n = 1, 8 a for 2, 6 a^2 for 3 and 8 a^3 for 4, where a is x
+// at the chord's middle.
+float kernel_slope_change(float a) {
+#if KERNEL_POWER == 1
+    return 2.0 * KERNEL_LOW;
+#elif KERNEL_POWER == 2
+    return (8.0 * KERNEL_LOW + 6.0 * KERNEL_HIGH * a) * a;
+#else
+    return 8.0 * KERNEL_LOW * a * a * a;
+#endif
+}
+
 // x over [begin, end] as a quadratic in Bernstein form.
 vec3 kernel_chord_bernstein(Chord chord, float begin, float end) {
     float from = (begin - chord.middle) / chord.radius;

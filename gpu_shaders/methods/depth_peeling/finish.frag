@@ -15,7 +15,7 @@ void main() {
     State state = state_unpack(texelFetch(state_tx, pixel, 0).xy);
     out_surface = vec4(vec3(0.0), uintBitsToFloat(0x7f800000u));
     out_color = vec4(0.0);
-    if (state.state != STATE_DONE || state.depth == NO_SURFACE)
+    if (!state_has_surface(state))
         return;
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
     vec3 gradient = texelFetch(gradient_tx, pixel, 0).xyz;

@@ -9,15 +9,17 @@ uniform sampler2D color_tx;
 #endif
 
 flat in uint v_id;
+flat in vec4 v_sphere;
+flat in vec2 v_density;
 layout(location = 0) out vec4 out_gradient; // view space, against the gradient
 layout(location = 1) out vec4 out_color;    // times the density, density
 
 void main() {
     State state = state_unpack(texelFetch(state_tx, ivec2(gl_FragCoord.xy), 0).xy);
-    if (state.state != STATE_DONE || state.depth == NO_SURFACE)
+    if (!state_has_surface(state))
         discard;
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
-    Ball ball = ball_fetch(v_id);
+    Ball ball = Ball(v_sphere.xyz, v_sphere.w);
     Chord chord = ball_chord(ball, ray);
     float from_middle = (state.depth / depth_scale - chord.middle) / chord.radius;
     float x = chord.peak - from_middle * from_middle;
@@ -28,9 +30,8 @@ void main() {
     vec2 offset = ball_offset(ball, ray);
     vec3 to_middle = -vec3(offset, 0.0) + direction * (dot(offset, ray.slope) / ray.stretch);
     vec3 from_center = to_middle / chord.radius + direction * from_middle;
-    float weight = ball_density(v_id).x;
-    out_gradient = vec4(weight * kernel_derivative(x) / chord.radius * from_center, 0.0);
-    float share = max(weight * kernel_value(x), 0.0);
+    out_gradient = vec4(v_density.x * kernel_derivative(x) / chord.radius * from_center, 0.0);
+    float share = max(v_density.x * kernel_value(x), 0.0);
 #if WITH_COLORS
     out_color = vec4(share * texelFetch(color_tx, ball_texel(v_id), 0).rgb, share);
 #else

@@ -1,36 +1,56 @@
-// Two triangles around each influence sphere: the rectangle between the tangents from the eye (Kanamori et al. 2008,
-// appendix B), written with directions so that spheres that reach behind the eye come out right as well.
-#include "lib/ball.glsl"
+// Two triangles around each sphere, as a strip. With FROM_PAIRS one instance for each pair of a ball and a cell: the part of
+// the ball's rectangle in that cell. Else one instance for each ball.
+#include "lib/sphere_bounds.glsl"
+#include "methods/depth_peeling/state.glsl"
+#if FROM_PAIRS
+#include "methods/depth_peeling/cells.glsl"
+
+in uvec2 in_pair; // ball, cell
+#endif
 
 flat out uint v_id;
+flat out vec4 v_sphere;  // as in sphere_tx
+flat out vec2 v_density; // as in density_tx
 
-const float UNBOUNDED = 1e30;
+#if STARTS_ONLY
+uniform float farthest_start; // scaled: the greatest distance at which a ray starts
+#endif
 
-// Where the sphere begins and ends along one axis, in units of the camera's window.
-vec2 sphere_extent(float coordinate, float depth, float radius) {
-    if (!is_perspective)
-        return vec2(coordinate - radius, coordinate + radius);
-    float tangent_2 = coordinate * coordinate + (depth - radius) * (depth + radius);
-    if (tangent_2 <= 0.0)
-        return vec2(-UNBOUNDED, UNBOUNDED);
-    float tangent = sqrt(tangent_2);
-    vec2 forward = depth * tangent + coordinate * radius * vec2(1.0, -1.0);
-    vec2 across = coordinate * tangent + depth * radius * vec2(-1.0, 1.0);
-    return vec2(forward.x > 0.0 ? across.x / forward.x : -UNBOUNDED, forward.y > 0.0 ? across.y / forward.y : UNBOUNDED);
+// Whether the pass is about this ball at all.
+bool is_drawn(Ball ball, vec2 density) {
+#if KERNEL_SPHERES
+    return density.y > 0.0;
+#elif STARTS_ONLY
+    return density.x < 0.0 || sphere_nearest(ball.center, ball.radius) * depth_scale <= farthest_start;
+#else
+    return true;
+#endif
 }
 
 void main() {
-    v_id = uint(gl_VertexID) / 6u;
+#if FROM_PAIRS
+    v_id = in_pair.x;
+#else
+    v_id = uint(gl_InstanceID);
+#endif
     Ball ball = ball_fetch(v_id);
-    vec2 extent_x = sphere_extent(ball.center.x, -ball.center.z, ball.radius);
-    vec2 extent_y = sphere_extent(ball.center.y, -ball.center.z, ball.radius);
-    // The corners of two triangles: 0 1 2, 2 1 3.
-    uint corner = uint(gl_VertexID) % 6u;
-    corner = corner < 3u ? corner : corner == 3u ? 2u : corner == 4u ? 1u : 3u;
-    bool right = (corner & 1u) == 1u, top = corner >= 2u;
-    vec2 window = vec2(right ? extent_x.y : extent_x.x, top ? extent_y.y : extent_y.x);
-    // A tenth of a pixel wider: rounding may not lose a pixel centre.
-    vec2 margin = 0.1 * pixel_size * vec2(right ? 1.0 : -1.0, top ? 1.0 : -1.0);
-    vec2 position = (window + margin - window_middle) / (pixel_size * image_middle);
-    gl_Position = vec4(clamp(position, -1.0, 1.0), 0.0, 1.0);
+    v_density = ball_density(v_id);
+    v_sphere = vec4(ball.center, ball.radius);
+#if KERNEL_SPHERES
+    float radius = v_density.y;
+#else
+    float radius = ball.radius;
+#endif
+    vec4 rectangle = sphere_rectangle(ball.center, radius);
+#if FROM_PAIRS
+    uint level = cell_level(in_pair.y);
+    vec2 cell = vec2(cell_position(in_pair.y)) * cell_size(level);
+    rectangle = vec4(max(rectangle.xy, cell), min(rectangle.zw, cell + cell_size(level)));
+#endif
+    // Where nothing is to be drawn all corners fall together.
+    vec2 corner = is_drawn(ball, v_density) ? vec2(gl_VertexID & 1, gl_VertexID >> 1) : vec2(0.0);
+    vec2 position = mix(rectangle.xy, max(rectangle.zw, rectangle.xy), corner) / image_middle - 1.0;
+    // A little nearer than any crossing: fragments may be dropped early by this depth.
+    float depth = clamp(sphere_nearest(ball.center, radius) * depth_scale, 0.0, 1.0);
+    gl_Position = vec4(position, max(2.0 * depth - 1.0 - 1e-6, -1.0), 1.0);
 }

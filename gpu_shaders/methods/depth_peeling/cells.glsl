@@ -1,0 +1,44 @@
+// Cells: squares of the image, in three levels: fine ones of CELL_SIZE pixels, coarse ones of COARSE_FACTOR times that, and the
+// whole image. For each a texture holds the range of distances that its pixels still ask for: the least of the distances that
+// they have reached, the greatest of those that they want to reach. Where none asks for anything, the range is empty.
+// A cell's number: level (2 bits), y (15 bits), x (15 bits).
+
+uniform sampler2D cells_0_tx;
+uniform sampler2D cells_1_tx;
+uniform sampler2D cells_2_tx;
+
+const uint WHOLE_IMAGE = 2u;
+const int CELLS_ACROSS = 4; // at most, of one ball
+const vec2 EMPTY_RANGE = vec2(4.0, -4.0);
+
+uint cell_number(uint level, ivec2 cell) {
+    return level << 30u | uint(cell.y) << 15u | uint(cell.x);
+}
+
+uint cell_level(uint number) {
+    return number >> 30u;
+}
+
+ivec2 cell_position(uint number) {
+    return ivec2(number & 0x7fffu, (number >> 15u) & 0x7fffu);
+}
+
+float cell_size(uint level) {
+    return level == 0u ? float(CELL_SIZE) : level == 1u ? float(CELL_SIZE * COARSE_FACTOR) : 32768.0;
+}
+
+vec2 cell_range(uint level, ivec2 cell) {
+    return level == 0u   ? texelFetch(cells_0_tx, cell, 0).xy
+           : level == 1u ? texelFetch(cells_1_tx, cell, 0).xy
+                         : texelFetch(cells_2_tx, cell, 0).xy;
+}
+
+// Whether a cell asks for anything between two scaled distances.
+bool cell_wants(uint level, ivec2 cell, float nearest, float farthest) {
+    vec2 range = cell_range(level, cell);
+    bool wants = range.x <= range.y && range.x <= farthest;
+#if BALL_CULLING
+    wants = wants && nearest <= range.y;
+#endif
+    return wants;
+}

@@ -1,0 +1,322 @@
+"""One image on its way through the shaders of Depth Peeling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ...capture import Capture, Range
+from ...context import GpuContext
+from ...step import Step
+from .programs import LIST_TARGETS, Phase, Variant
+from .targets import CellTargets, Targets
+
+PASSES_A_BATCH = 4
+"""Passes between two looks at what is left. Even: both of each pair of targets are written."""
+_PAIR_BYTES = 8
+_PAIRS_A_BALL = 3
+"""To begin with; the buffers grow where it is not enough."""
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of a ball and a cell, in the order of the balls."""
+
+    buffer: moderngl.Buffer
+    count: int
+
+
+class Frame:
+    """Draws one image.
+
+    Parameters
+    ----------
+    context, targets
+        Where to draw.
+    variant
+        What the programs depend on.
+    ball_count
+        How many balls there are.
+    check_cancelled
+        Called between batches; may raise.
+    """
+
+    def __init__(
+        self,
+        context: GpuContext,
+        targets: Targets,
+        variant: Variant,
+        ball_count: int,
+        check_cancelled: Callable[[], None],
+    ) -> None:
+        self._gl = context.gl
+        self._targets = targets
+        self._variant = variant
+        self._ball_count = ball_count
+        self._check_cancelled = check_cancelled
+        # Which of each pair of targets holds the present state.
+        self._now = 0
+        self._queries = [self._gl.query(samples=True) for _ in range(PASSES_A_BATCH)]
+        self._capture = Capture(context)
+        self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
+        self._pair_buffers = [self._pair_buffer(_PAIRS_A_BALL * ball_count) for _ in range(3)]
+        self._cells, self._older_cells = targets.cells(variant.cell_size)
+
+    def bind(self, textures: dict[str, moderngl.Texture], uniforms: dict[str, object]) -> None:
+        """Give every step the balls and the camera."""
+        for step in self._steps.values():
+            step.set_uniforms({**uniforms, "cells_across": self._cells.across})
+            step.textures.update(textures)
+
+    def draw(self, group_starts: npt.NDArray[np.int64], group_corners: npt.NDArray[np.float32] | None) -> dict[str, int]:
+        """Find the surface; counts of what happened.
+
+        Parameters
+        ----------
+        group_starts
+            (G + 1,): where the groups of balls begin and end.
+        group_corners
+            (G, 4, 3): the groups' rectangles, see `Groups.corners`; None: all groups are drawn.
+        """
+        self._gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
+        self._begin()
+        self._measure_cells_twice(Phase.PEELING)
+        pairs = self._bin(group_starts, group_corners)
+        counts = {"pairs": pairs.count, "peels": self._peel(pairs)}
+        counts["overflows"] = self._count_walkers()
+        counts["walks"] = self._walk(pairs) if counts["overflows"] else 0
+        self._gather(pairs)
+        if self._variant.options.diagnostics:
+            counts.update(self._diagnostics(pairs))
+        return counts
+
+    def read(self, output: int) -> npt.NDArray[np.float32]:
+        """(height, width, 4): an output of finish.frag."""
+        width, height = self._targets.size
+        return np.frombuffer(self._targets.outputs[output].read(), np.float32).reshape(height, width, 4)
+
+    def _state(self) -> moderngl.Texture:
+        return self._targets.lists[self._now][0]
+
+    def _begin(self) -> None:
+        """Find the kernel spheres, and where rays start inside; set all rays to their start."""
+        targets = self._targets
+        targets.kernel.clear(depth=1.0)
+        if self._variant.options.kernel_spheres:
+            self._over_balls("kernel", targets.kernel, moderngl.DEPTH_TEST)
+        if self._variant.with_starts:
+            targets.start.clear()
+            self._gl.blend_equation = moderngl.FUNC_ADD
+            self._over_balls("start", targets.start, moderngl.BLEND, kernel_depth_tx=targets.kernel_depth)
+        self._over_screen("begin", targets.begin, kernel_depth_tx=targets.kernel_depth, start_tx=targets.start_density)
+        for framebuffer in targets.search if self._variant.options.diagnostics else ():
+            # Bits of the float 0 are those of the number 0.
+            framebuffer.clear()
+
+    def _bin(self, starts: npt.NDArray[np.int64], corners: npt.NDArray[np.float32] | None) -> Pairs:
+        """The pairs of balls and cells that may matter."""
+        queries = [None] * (len(starts) - 1) if corners is None else self._query_groups(corners)
+        ranges = [
+            (int(first), int(end - first), query) for first, end, query in zip(starts[:-1], starts[1:], queries, strict=True)
+        ]
+        step = self._steps["bin"]
+        return self._captured(0, step, step.vertex_array(), ranges)
+
+    def _query_groups(self, corners: npt.NDArray[np.float32]) -> list[moderngl.Query]:
+        """An occlusion query for each group, against the kernel spheres."""
+        framebuffer = self._targets.peel[self._now]
+        framebuffer.color_mask, framebuffer.depth_mask = (False,) * 4, False
+        step = self._steps["group"]
+        array = step.vertex_array(self._gl.buffer(corners), "3f", "in_corner")
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "<"
+        framebuffer.use()
+        queries = []
+        for group in range(len(corners)):
+            queries.append(self._gl.query(any_samples=True))
+            with queries[-1]:
+                array.render(moderngl.TRIANGLE_STRIP, 4, first=4 * group)
+        framebuffer.color_mask, framebuffer.depth_mask = (True,) * 4, True
+        return queries
+
+    def _keep(self, pairs: Pairs, phase: Phase) -> Pairs:
+        """Those of the pairs whose cells still ask for them."""
+        step = self._steps[f"keep_{phase.name.lower()}"]
+        slot = 2 if pairs.buffer is self._pair_buffers[1] else 1
+        array = step.vertex_array(pairs.buffer, "2u4", "in_pair")
+        return self._captured(slot, step, array, [(0, pairs.count, None)])
+
+    def _captured(self, slot: int, step: Step, array: moderngl.VertexArray, ranges: Sequence[Range]) -> Pairs:
+        """What a step emits, in a pair buffer; once more where the buffer was too small."""
+        step.use_textures(self._cells.textures)
+        count = self._capture.points(array, ranges, self._pair_buffers[slot])
+        if count * _PAIR_BYTES > self._pair_buffers[slot].size:
+            self._pair_buffers[slot] = self._pair_buffer(count)
+            count = self._capture.points(array, ranges, self._pair_buffers[slot])
+        return Pairs(self._pair_buffers[slot], count)
+
+    def _pair_buffer(self, count: int) -> moderngl.Buffer:
+        return self._gl.buffer(reserve=_PAIR_BYTES * count, dynamic=True)
+
+    def _measure_cells(self, phase: Phase) -> None:
+        """What the cells of the image ask for now."""
+        self._cells, self._older_cells = self._older_cells, self._cells
+        cells = self._cells
+        read = {"state_tx": self._state(), "barrier_tx": self._targets.barrier}
+        self._over_screen(f"cells_from_pixels_{phase.name.lower()}", cells.framebuffers[0], **read)
+        for level in (1, 2):
+            self._steps["cells_from_cells"].set_uniforms({"smaller_across": cells.factors[level]})
+            self._over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])
+
+    def _measure_cells_twice(self, phase: Phase) -> None:
+        """So that both sets are of this phase."""
+        self._measure_cells(phase)
+        self._measure_cells(phase)
+
+    def _peel(self, pairs: Pairs) -> int:
+        """Peel and search until nothing is left to peel; how often."""
+        targets = self._targets
+
+        def one_peel(pairs: Pairs, cells: CellTargets, query: moderngl.Query) -> None:
+            with query:
+                self._over_pairs("peel", targets.peel[self._now], moderngl.DEPTH_TEST, pairs, state_tx=self._state())
+            read = {"state_tx": self._state(), "depth_tx": targets.depths[self._now], "crossing_tx": targets.crossing}
+            read.update({f"list_{index}_tx": targets.lists[self._now][index] for index in range(1, LIST_TARGETS)})
+            if self._variant.options.diagnostics:
+                read["iterations_tx"] = targets.iterations[self._now]
+            self._over_tiles("search", targets.search[1 - self._now], cells, barrier_tx=targets.barrier, **read)
+
+        return self._until_nothing_is_left(one_peel, pairs, Phase.PEELING)
+
+    def _walk(self, pairs: Pairs) -> int:
+        """Walk the rays whose lists were too short until all have arrived; how many steps that took."""
+        targets = self._targets
+        self._over_screen("begin_walk", targets.state_only[1 - self._now], state_tx=self._state())
+        self._now = 1 - self._now
+        self._measure_cells_twice(Phase.WALKING)
+
+        def one_step(pairs: Pairs, cells: CellTargets, query: moderngl.Query) -> None:
+            targets.walk.clear(0.0, 0.0, 0.0, 2.0)
+            with query:
+                self._gl.blend_equation = moderngl.FUNC_ADD, moderngl.MIN
+                self._over_pairs("walk_sum", targets.walk, moderngl.BLEND, pairs, state_tx=self._state())
+            read = {"state_tx": self._state(), "sums_tx": targets.sums[0], "barrier_tx": targets.barrier}
+            self._over_tiles("walk_step", targets.state_only[1 - self._now], cells, **read)
+
+        return self._until_nothing_is_left(one_step, self._keep(pairs, Phase.WALKING), Phase.WALKING)
+
+    def _until_nothing_is_left(
+        self, one_pass: Callable[[Pairs, CellTargets, moderngl.Query], None], pairs: Pairs, phase: Phase
+    ) -> int:
+        """Repeat a pass over the pairs, each only if the pass before has drawn something; how often.
+
+        The processor waits for the graphics processor only once a batch.
+        """
+        passes = 0
+        previous: moderngl.Query | None = None
+        while True:
+            self._check_cancelled()
+            before = self._now
+            for query in self._queries:
+                with nullcontext() if previous is None else previous.crender:
+                    # The cells of the batch before: what is done since then may be known to one of a pair of targets only.
+                    one_pass(pairs, self._older_cells, query)
+                self._now = 1 - self._now
+                previous = query
+            drawn = [bool(query.samples) for query in self._queries]
+            # The first pass that draws no ball is the last that is needed; those after it may have been left out.
+            done = len(drawn) if all(drawn) else drawn.index(False) + 1
+            self._now = before ^ (done & 1)
+            passes += done
+            if not all(drawn):
+                return passes
+            self._measure_cells(phase)
+            pairs = self._keep(pairs, phase)
+
+    def _count_walkers(self) -> int:
+        """How many rays had lists that were too short."""
+        query = self._gl.query(samples=True)
+        with query:
+            self._over_screen("count_walkers", self._targets.state_only[1 - self._now], state_tx=self._state())
+        return int(query.samples)
+
+    def _gather(self, pairs: Pairs) -> None:
+        """Sum the gradient and the colours at the surface; make the outputs."""
+        targets = self._targets
+        self._measure_cells(Phase.DONE)
+        targets.gather.clear()
+        self._gl.blend_equation = moderngl.FUNC_ADD
+        self._over_pairs("gather", targets.gather, moderngl.BLEND, self._keep(pairs, Phase.DONE), state_tx=self._state())
+        read = {"state_tx": self._state(), "gradient_tx": targets.sums[0], "color_sum_tx": targets.sums[1]}
+        self._over_screen("finish", targets.finish, **read)
+
+    def _diagnostics(self, pairs: Pairs) -> dict[str, int]:
+        """Counts that cost time."""
+        words = np.frombuffer(pairs.buffer.read(_PAIR_BYTES * pairs.count), np.uint32).reshape(-1, 2)
+        width, height = self._targets.size
+        iterations = np.frombuffer(self._targets.iterations[self._now].read(), np.uint32).reshape(height, width, 4)
+        return {
+            "balls_kept": len(np.unique(words[:, 0])),
+            "bezier_solves": int(iterations[..., 0].sum()),
+            "bezier_iterations": int(iterations[..., 1].sum()),
+            "bezier_iterations_max": int(iterations[..., 2].max()),
+        }
+
+    def _over_screen(self, name: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
+        """Draw every pixel once; a depth buffer is written, never asked."""
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "1"
+        self._render(name, framebuffer, textures, None, 1, moderngl.TRIANGLES, 3)
+
+    def _over_tiles(self, name: str, framebuffer: moderngl.Framebuffer, cells: CellTargets, **textures: moderngl.Texture) -> None:
+        """Draw the pixels of the fine cells that ask for something; a depth buffer is written, never asked."""
+        self._gl.enable_only(moderngl.DEPTH_TEST)
+        self._gl.depth_func = "1"
+        self._render(name, framebuffer, {**textures, **cells.textures}, None, cells.across * cells.down)
+
+    def _over_balls(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, **textures: moderngl.Texture) -> None:
+        """Draw the rectangle of every ball."""
+        self._draw_spheres(name, framebuffer, flags, textures, None, self._ball_count)
+
+    def _over_pairs(
+        self, name: str, framebuffer: moderngl.Framebuffer, flags: int, pairs: Pairs, **textures: moderngl.Texture
+    ) -> None:
+        """Draw the part of each pair's ball in its cell."""
+        self._draw_spheres(name, framebuffer, flags, textures, pairs.buffer, pairs.count)
+
+    def _draw_spheres(
+        self,
+        name: str,
+        framebuffer: moderngl.Framebuffer,
+        flags: int,
+        textures: dict[str, moderngl.Texture],
+        pairs: moderngl.Buffer | None,
+        count: int,
+    ) -> None:
+        self._gl.enable_only(flags)
+        self._gl.depth_func = "<"
+        self._gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._render(name, framebuffer, textures, pairs, count)
+
+    def _render(
+        self,
+        name: str,
+        framebuffer: moderngl.Framebuffer,
+        textures: dict[str, moderngl.Texture],
+        pairs: moderngl.Buffer | None,
+        instances: int,
+        mode: int = moderngl.TRIANGLE_STRIP,
+        vertices: int = 4,
+    ) -> None:
+        if not instances:
+            return
+        step = self._steps[name]
+        step.use_textures(textures)
+        framebuffer.use()
+        array = step.vertex_array() if pairs is None else step.vertex_array(pairs, "2u4 /i", "in_pair")
+        array.render(mode, vertices, instances=instances)

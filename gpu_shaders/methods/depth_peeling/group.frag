@@ -1,0 +1,4 @@
+// Only counted, never kept.
+
+void main() {
+}

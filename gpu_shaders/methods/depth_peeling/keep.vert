@@ -1,0 +1,29 @@
+// Whether a pair's cell still asks for its ball.
+#include "lib/sphere_bounds.glsl"
+#include "methods/depth_peeling/state.glsl"
+#include "methods/depth_peeling/cells.glsl"
+
+in uvec2 in_pair;
+
+flat out uvec2 v_pair;
+flat out int v_is_kept;
+
+#if CELL_PHASE == 0
+uniform float farthest_start; // scaled: the greatest distance at which a ray starts
+#endif
+
+// The greatest scaled distance at which the ball still matters.
+float farthest(Ball ball) {
+#if CELL_PHASE == 0
+    return max(sphere_farthest_entry(ball.center, ball.radius) * depth_scale, farthest_start);
+#else
+    return sphere_farthest(ball.center, ball.radius) * depth_scale;
+#endif
+}
+
+void main() {
+    v_pair = in_pair;
+    Ball ball = ball_fetch(in_pair.x);
+    float nearest = sphere_nearest(ball.center, ball.radius) * depth_scale;
+    v_is_kept = int(cell_wants(cell_level(in_pair.y), cell_position(in_pair.y), nearest, farthest(ball)));
+}

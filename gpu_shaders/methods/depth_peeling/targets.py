@@ -1,0 +1,77 @@
+"""The images that Depth Peeling draws into."""
+
+from __future__ import annotations
+
+import moderngl
+
+from ...context import GpuContext
+from .programs import CELL_SIZES, COARSE_FACTOR, LIST_TARGETS
+
+
+class Targets:
+    """Textures and framebuffers for one size of image. Of what is read while its successor is written there are two."""
+
+    def __init__(self, context: GpuContext, size: tuple[int, int], with_iterations: bool) -> None:
+        gl = context.gl
+        self.size = size
+        self.with_iterations = with_iterations
+
+        def words(components: int) -> moderngl.Texture:
+            return _plain(gl.texture(size, components, dtype="u4"))
+
+        def floats(components: int) -> moderngl.Texture:
+            return _plain(gl.texture(size, components, dtype="f4"))
+
+        self.kernel_depth = context.depth_texture(size)
+        self.start_density = floats(2)
+        self.barrier = floats(1)
+        self.crossing = words(1)
+        self.depths = [context.depth_texture(size) for _ in range(2)]
+        self.lists = [[words(4) for _ in range(LIST_TARGETS)] for _ in range(2)]
+        self.iterations = [words(4) for _ in range(2)] if with_iterations else []
+        self.sums = [floats(4) for _ in range(2)]
+        self.outputs = [floats(4) for _ in range(2)]
+        self.kernel = gl.framebuffer([], self.kernel_depth)
+        self.start = gl.framebuffer([self.start_density])
+        self.begin = gl.framebuffer([self.lists[0][0], self.barrier], self.depths[0])
+        self.peel = [gl.framebuffer([self.crossing], depth) for depth in self.depths]
+        self.search = [
+            gl.framebuffer([*self.lists[index], *self.iterations[index : index + 1]], self.depths[index]) for index in range(2)
+        ]
+        self.state_only = [gl.framebuffer(targets[:1]) for targets in self.lists]
+        self.walk = gl.framebuffer(self.sums[:1])
+        self.gather = gl.framebuffer(self.sums)
+        self.finish = gl.framebuffer(self.outputs)
+        self._cells: dict[int, list[CellTargets]] = {}
+        self._gl = gl
+
+    def cells(self, cell_size: int) -> list[CellTargets]:
+        """Two sets of cells of this size."""
+        assert cell_size in CELL_SIZES
+        if cell_size not in self._cells:
+            self._cells[cell_size] = [CellTargets(self._gl, self.size, cell_size) for _ in range(2)]
+        return self._cells[cell_size]
+
+
+class CellTargets:
+    """What the cells of the image ask for, in three levels; see cells.glsl."""
+
+    def __init__(self, gl: moderngl.Context, size: tuple[int, int], cell_size: int) -> None:
+        sizes = [size]
+        for factor in (cell_size, COARSE_FACTOR):
+            sizes.append((-(-sizes[-1][0] // factor), -(-sizes[-1][1] // factor)))
+        self.across, self.down = sizes[1]
+        self.levels = [_plain(gl.texture(level_size, 2, dtype="f4")) for level_size in (*sizes[1:], (1, 1))]
+        self.framebuffers = [gl.framebuffer([texture]) for texture in self.levels]
+        # How many cells of the level before lie across one.
+        self.factors = [cell_size, COARSE_FACTOR, max(sizes[2])]
+
+    @property
+    def textures(self) -> dict[str, moderngl.Texture]:
+        """By sampler name."""
+        return {f"cells_{level}_tx": texture for level, texture in enumerate(self.levels)}
+
+
+def _plain(texture: moderngl.Texture) -> moderngl.Texture:
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture
