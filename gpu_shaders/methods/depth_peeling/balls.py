@@ -14,7 +14,7 @@ from ....addon.fluid.view_balls import ViewBalls
 from .groups import spatial_order
 from .programs import BALL_TEXTURE_WIDTH, CELL_SIZES
 
-CELLS_A_BALL = 3
+CELLS_A_BALL = 2
 """A fine cell is as large as a middling ball would need to lie across so many of them at most."""
 
 

@@ -14,10 +14,10 @@ from ...capture import Capture, Range
 from ...context import GpuContext
 from ...step import Step
 from .programs import LIST_TARGETS, Phase, Variant
-from .targets import CellTargets, Targets
+from .targets import Targets
 
-PASSES_A_BATCH = 4
-"""Passes between two looks at what is left. Even: both of each pair of targets are written."""
+PASSES_A_BATCH = 2
+"""Passes between two looks at what is left."""
 _PAIR_BYTES = 8
 _PAIRS_A_BALL = 3
 """To begin with; the buffers grow where it is not enough."""
@@ -65,7 +65,7 @@ class Frame:
         self._capture = Capture(context)
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
         self._pair_buffers = [self._pair_buffer(_PAIRS_A_BALL * ball_count) for _ in range(3)]
-        self._cells, self._older_cells = targets.cells(variant.cell_size)
+        self._cells = targets.cells(variant.cell_size)
 
     def bind(self, textures: dict[str, moderngl.Texture], uniforms: dict[str, object]) -> None:
         """Give every step the balls and the camera."""
@@ -85,7 +85,7 @@ class Frame:
         """
         self._gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
         self._begin()
-        self._measure_cells_twice(Phase.PEELING)
+        self._measure_cells(Phase.PEELING)
         pairs = self._bin(group_starts, group_corners)
         counts = {"pairs": pairs.count, "peels": self._peel(pairs)}
         counts["overflows"] = self._count_walkers()
@@ -102,6 +102,10 @@ class Frame:
 
     def _state(self) -> moderngl.Texture:
         return self._targets.lists[self._now][0]
+
+    def _turn(self) -> None:
+        """What was written is read from now on."""
+        self._now = 1 - self._now
 
     def _begin(self) -> None:
         """Find the kernel spheres, and where rays start inside; set all rays to their start."""
@@ -165,31 +169,25 @@ class Frame:
 
     def _measure_cells(self, phase: Phase) -> None:
         """What the cells of the image ask for now."""
-        self._cells, self._older_cells = self._older_cells, self._cells
-        cells = self._cells
-        read = {"state_tx": self._state(), "barrier_tx": self._targets.barrier}
+        cells, older = self._cells, self._targets.lists[1 - self._now][0]
+        read = {"state_tx": self._state(), "older_state_tx": older, "barrier_tx": self._targets.barrier}
         self._over_screen(f"cells_from_pixels_{phase.name.lower()}", cells.framebuffers[0], **read)
         for level in (1, 2):
             self._steps["cells_from_cells"].set_uniforms({"smaller_across": cells.factors[level]})
             self._over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])
 
-    def _measure_cells_twice(self, phase: Phase) -> None:
-        """So that both sets are of this phase."""
-        self._measure_cells(phase)
-        self._measure_cells(phase)
-
     def _peel(self, pairs: Pairs) -> int:
         """Peel and search until nothing is left to peel; how often."""
         targets = self._targets
 
-        def one_peel(pairs: Pairs, cells: CellTargets, query: moderngl.Query) -> None:
+        def one_peel(pairs: Pairs, query: moderngl.Query) -> None:
             with query:
                 self._over_pairs("peel", targets.peel[self._now], moderngl.DEPTH_TEST, pairs, state_tx=self._state())
             read = {"state_tx": self._state(), "depth_tx": targets.depths[self._now], "crossing_tx": targets.crossing}
             read.update({f"list_{index}_tx": targets.lists[self._now][index] for index in range(1, LIST_TARGETS)})
             if self._variant.options.diagnostics:
                 read["iterations_tx"] = targets.iterations[self._now]
-            self._over_tiles("search", targets.search[1 - self._now], cells, barrier_tx=targets.barrier, **read)
+            self._over_tiles("search", targets.search[1 - self._now], barrier_tx=targets.barrier, **read)
 
         return self._until_nothing_is_left(one_peel, pairs, Phase.PEELING)
 
@@ -197,21 +195,21 @@ class Frame:
         """Walk the rays whose lists were too short until all have arrived; how many steps that took."""
         targets = self._targets
         self._over_screen("begin_walk", targets.state_only[1 - self._now], state_tx=self._state())
-        self._now = 1 - self._now
-        self._measure_cells_twice(Phase.WALKING)
+        self._turn()
+        self._measure_cells(Phase.WALKING)
 
-        def one_step(pairs: Pairs, cells: CellTargets, query: moderngl.Query) -> None:
+        def one_step(pairs: Pairs, query: moderngl.Query) -> None:
             targets.walk.clear(0.0, 0.0, 0.0, 2.0)
             with query:
                 self._gl.blend_equation = moderngl.FUNC_ADD, moderngl.MIN
                 self._over_pairs("walk_sum", targets.walk, moderngl.BLEND, pairs, state_tx=self._state())
             read = {"state_tx": self._state(), "sums_tx": targets.sums[0], "barrier_tx": targets.barrier}
-            self._over_tiles("walk_step", targets.state_only[1 - self._now], cells, **read)
+            self._over_tiles("walk_step", targets.state_only[1 - self._now], **read)
 
         return self._until_nothing_is_left(one_step, self._keep(pairs, Phase.WALKING), Phase.WALKING)
 
     def _until_nothing_is_left(
-        self, one_pass: Callable[[Pairs, CellTargets, moderngl.Query], None], pairs: Pairs, phase: Phase
+        self, one_pass: Callable[[Pairs, moderngl.Query], None], pairs: Pairs, phase: Phase
     ) -> int:
         """Repeat a pass over the pairs, each only if the pass before has drawn something; how often.
 
@@ -224,9 +222,8 @@ class Frame:
             before = self._now
             for query in self._queries:
                 with nullcontext() if previous is None else previous.crender:
-                    # The cells of the batch before: what is done since then may be known to one of a pair of targets only.
-                    one_pass(pairs, self._older_cells, query)
-                self._now = 1 - self._now
+                    one_pass(pairs, query)
+                self._turn()
                 previous = query
             drawn = [bool(query.samples) for query in self._queries]
             # The first pass that draws no ball is the last that is needed; those after it may have been left out.
@@ -273,11 +270,11 @@ class Frame:
         self._gl.depth_func = "1"
         self._render(name, framebuffer, textures, None, 1, moderngl.TRIANGLES, 3)
 
-    def _over_tiles(self, name: str, framebuffer: moderngl.Framebuffer, cells: CellTargets, **textures: moderngl.Texture) -> None:
+    def _over_tiles(self, name: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
         """Draw the pixels of the fine cells that ask for something; a depth buffer is written, never asked."""
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "1"
-        self._render(name, framebuffer, {**textures, **cells.textures}, None, cells.across * cells.down)
+        self._render(name, framebuffer, {**textures, **self._cells.textures}, None, self._cells.across * self._cells.down)
 
     def _over_balls(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, **textures: moderngl.Texture) -> None:
         """Draw the rectangle of every ball."""

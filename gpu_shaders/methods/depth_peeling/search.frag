@@ -25,7 +25,7 @@ uniform usampler2D iterations_tx;
 #endif
 
 // Balls, and where the ray leaves them, in scaled distances.
-uint ids[14];
+uint ids[14] = uint[14](0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
 float exits[14];
 
 // A lone ball's surface is its kernel sphere ("single case"). As a share of the interval, or BEZIER_NO_ROOT.
@@ -109,16 +109,23 @@ State enter(State state, uint crossing) {
     return state;
 }
 
+// Texels that hold no ball of the list are not read.
+void read_list(ivec2 pixel, uvec2 first, uint count) {
+    uvec4 texel_1 = count > 2u ? texelFetch(list_1_tx, pixel, 0) : uvec4(0u);
+    uvec4 texel_2 = count > 6u ? texelFetch(list_2_tx, pixel, 0) : uvec4(0u);
+    uvec4 texel_3 = count > 10u ? texelFetch(list_3_tx, pixel, 0) : uvec4(0u);
+    ids = uint[14](first.x, first.y, texel_1.x, texel_1.y, texel_1.z, texel_1.w, texel_2.x, texel_2.y, texel_2.z, texel_2.w,
+                   texel_3.x, texel_3.y, texel_3.z, texel_3.w);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    uvec4 texel_0 = texelFetch(state_tx, pixel, 0), texel_1 = texelFetch(list_1_tx, pixel, 0);
-    uvec4 texel_2 = texelFetch(list_2_tx, pixel, 0), texel_3 = texelFetch(list_3_tx, pixel, 0);
-    State state = state_unpack(texel_0.xy);
-    ids = uint[14](texel_0.z, texel_0.w, texel_1.x, texel_1.y, texel_1.z, texel_1.w, texel_2.x, texel_2.y, texel_2.z, texel_2.w,
-                   texel_3.x, texel_3.y, texel_3.z, texel_3.w);
-    float barrier = texelFetch(barrier_tx, pixel, 0).x;
-
+    uvec4 texel = texelFetch(state_tx, pixel, 0);
+    State state = state_unpack(texel.xy);
+    float barrier = 0.0;
     if (state.phase == PHASE_PEELING) {
+        read_list(pixel, texel.zw, state.count);
+        barrier = texelFetch(barrier_tx, pixel, 0).x;
         Ray ray = ray_from_pixel(gl_FragCoord.xy);
         float next = texelFetch(depth_tx, pixel, 0).x;
         state = advance(state, next, barrier, ray);
@@ -127,7 +134,6 @@ void main() {
         else if (state.phase == PHASE_PEELING)
             state = barrier < NO_BARRIER ? with_surface(state, barrier, ray) : state_done(state, NO_SURFACE);
     }
-
     out_state = uvec4(state_pack(state), ids[0], ids[1]);
     out_list_1 = uvec4(ids[2], ids[3], ids[4], ids[5]);
     out_list_2 = uvec4(ids[6], ids[7], ids[8], ids[9]);
@@ -136,6 +142,6 @@ void main() {
     uvec3 before = texelFetch(iterations_tx, pixel, 0).xyz;
     out_iterations = uvec4(before.xy + bezier_effort.xy, max(before.z, bezier_effort.z), 0u);
 #endif
-    // Only what is nearer than the barrier may pass; a pixel that is done or walks lets no sphere pass.
+    // Only what is nearer than the barrier may pass the next peel; nothing where the ray is done or walks.
     gl_FragDepth = state.phase == PHASE_PEELING ? barrier : 0.0;
 }

@@ -42,14 +42,14 @@ class Targets:
         self.walk = gl.framebuffer(self.sums[:1])
         self.gather = gl.framebuffer(self.sums)
         self.finish = gl.framebuffer(self.outputs)
-        self._cells: dict[int, list[CellTargets]] = {}
+        self._cells: dict[int, CellTargets] = {}
         self._gl = gl
 
-    def cells(self, cell_size: int) -> list[CellTargets]:
-        """Two sets of cells of this size."""
+    def cells(self, cell_size: int) -> CellTargets:
+        """Cells of this size."""
         assert cell_size in CELL_SIZES
         if cell_size not in self._cells:
-            self._cells[cell_size] = [CellTargets(self._gl, self.size, cell_size) for _ in range(2)]
+            self._cells[cell_size] = CellTargets(self._gl, self.size, cell_size)
         return self._cells[cell_size]
 
 
