@@ -69,6 +69,10 @@ class MENISCUS_PT_scene(bpy.types.Panel):
         layout.prop(settings, "backend")
         layout.prop(settings, "color")
         layout.prop(settings, "ambient")
+        layout.prop(settings, "depth_contrast")
+        radius = layout.column()
+        radius.active = settings.depth_contrast > 0
+        radius.prop(settings, "depth_contrast_radius")
 
 
 def _draw_radius(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

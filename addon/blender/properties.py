@@ -168,6 +168,24 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
     )
+    depth_contrast: FloatProperty(
+        name="Depth Contrast",
+        description="How strongly what is in front is lightened and what is behind it is darkened; 3 is a good start, 0 is off",
+        default=Look().depth_contrast,
+        min=0.0,
+        max=100.0,
+        soft_max=10.0,
+    )
+    depth_contrast_radius: FloatProperty(
+        name="Contrast Radius",
+        description="How far from the edge of what is in front the light changes, as a share of the image's height",
+        default=Look().depth_contrast_radius,
+        min=0.001,
+        max=1.0,
+        soft_max=0.2,
+        precision=3,
+        subtype="FACTOR",
+    )
 
 
 _OWNERS = ((bpy.types.Object, MENISCUS_PG_object), (bpy.types.Scene, MENISCUS_PG_scene))

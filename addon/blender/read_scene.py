@@ -53,7 +53,13 @@ def read_field(scene: bpy.types.Scene) -> Field:
 
 def read_look(scene: bpy.types.Scene) -> Look:
     """The colour and light that the scene's settings describe."""
-    return Look(color=tuple(scene.meniscus.color), ambient=scene.meniscus.ambient)
+    settings = scene.meniscus
+    return Look(
+        color=tuple(settings.color),
+        ambient=settings.ambient,
+        depth_contrast=settings.depth_contrast,
+        depth_contrast_radius=settings.depth_contrast_radius,
+    )
 
 
 def _parts_of(source: Source, depsgraph: bpy.types.Depsgraph, viewport: bool) -> list[BallPart]:

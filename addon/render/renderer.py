@@ -16,6 +16,7 @@ from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
+from .depth_contrast import spatial_importance
 from .method import Attribute, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .shading import headlight
@@ -153,10 +154,16 @@ class _Shot:
             "depth": lambda: surface.depth,
             "normal": lambda: surface.normal,
             "position": lambda: _positions(surface.depth, hit, camera),
-            "combined": lambda: headlight(surface.normal, camera, surface.color, hit, self.look),
+            "combined": lambda: self._combined(surface, hit),
             "velocity": lambda: _velocities(surface),
             "ball_id": lambda: _ball_ids(surface, self.request.balls, hit),
         }
+
+    def _combined(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+        look, importance = self.look, None
+        if look.depth_contrast > 0:
+            importance = spatial_importance(surface.depth, hit, self.camera, look.depth_contrast_radius)
+        return headlight(surface.normal, self.request.camera, surface.color, hit, look, importance)
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> tuple[MethodInfo, Method]:

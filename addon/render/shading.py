@@ -15,6 +15,7 @@ def headlight(
     color: npt.NDArray[np.float32] | None,
     hit: npt.NDArray[np.bool_],
     look: Look,
+    importance: npt.NDArray[np.float32] | None = None,
 ) -> npt.NDArray[np.float32]:
     """Light from the eye on a diffuse surface; both of its sides are lit.
 
@@ -28,6 +29,8 @@ def headlight(
         (height, width, 3) linear Rec.709, None: the look's colour.
     hit
         (height, width): where there is a surface.
+    importance
+        (height, width), see :func:`depth_contrast.spatial_importance`; None: the light stays as it is.
 
     Returns
     -------
@@ -36,6 +39,9 @@ def headlight(
     light = np.abs(_cosines(normal, camera))
     light *= 1 - look.ambient
     light += look.ambient
+    if importance is not None:
+        # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
+        light *= 1 + np.tanh(look.depth_contrast * importance)
     light *= hit
     rgba = np.empty((*hit.shape, 4), np.float32)
     for channel, value in enumerate(look.color):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from judge import judge
+from judge import expected, judge
 from scenes import SCENES
 
 import meniscus
+from meniscus.addon.render.depth_contrast import spatial_importance
 from meniscus.addon.render.registry import method_infos
 
 METHODS = [info.name for info in method_infos()]
@@ -71,6 +72,26 @@ def test_colors_blend_by_their_share_of_the_density(method):
     np.testing.assert_allclose(row[20], [0.5, 0, 0.5, 1], atol=1e-5)
     np.testing.assert_allclose(row[7], [1, 0, 0, 1], atol=1e-5)
     np.testing.assert_allclose(row[33], [0, 0, 1, 1], atol=1e-5)
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("method", METHODS)
+def test_depth_contrast_is_that_of_the_exact_depths(method, projection):
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera(projection)
+    want = expected(scene.balls, scene.field, camera)
+    hit = np.isfinite(want.t).reshape(camera.height, camera.width)
+    depth = np.where(hit, (want.t / want.stretch).reshape(hit.shape), 1e10).astype(np.float32)
+    plain, changed = (
+        meniscus.render(scene.balls, camera, scene.field, method=method, passes=("combined",), look=look)["combined"]
+        for look in (meniscus.Look(), meniscus.Look(depth_contrast=4.0, depth_contrast_radius=0.05))
+    )
+    factor = 1 + np.tanh(4 * spatial_importance(depth, hit, camera, 0.05))
+    assert np.ptp(factor[hit]) > 1, "the scene should have steps in depth"
+    both = hit & (plain[..., 3] > 0)
+    assert np.count_nonzero(hit != (plain[..., 3] > 0)) <= 2
+    np.testing.assert_allclose(changed[both][:, 2], plain[both][:, 2] * factor[both], atol=2e-3)
+    np.testing.assert_array_equal(changed[..., 3], plain[..., 3])
 
 
 @pytest.mark.parametrize("method", METHODS)
