@@ -31,7 +31,7 @@ bench: setup ## Time Meniscus on named scenes (ARGS="--scenes random_1k --repeat
 bench-peers: setup ## Time what users have today beside Meniscus, and judge both by the oracle
 	@PYTHONPATH=tests:tools $(VENV) -m bench.run_peers $(ARGS)
 
-lint: setup ## Check style, format, types and the import rules
+lint: setup ## Check style, format, types, import rules and shaders
 	@$(VENV) tools/lint.py
 
 format: setup ## Format the Python and Rust files

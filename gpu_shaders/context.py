@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import ctypes
 import platform
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from threading import Lock
 from typing import Any, TypeVar
 
 import glcontext
 import moderngl
 
 from ..addon.fluid.errors import DeviceError
+from .debug_output import DebugOutput
+from .driver_state import CONTEXT_LOST, DriverState
+from .limits import Limits
 from .programs import ProgramSource
 
 Result = TypeVar("Result")
@@ -26,6 +30,10 @@ _GL_TEXTURE_2D = 0x0DE1
 _GL_DEPTH_COMPONENT = 0x1902
 _GL_DEPTH_COMPONENT32F = 0x8CAC
 _GL_FLOAT = 0x1406
+_LOST = (
+    "The graphics driver was reset and what was being rendered is lost; render again, and if it happens again a smaller image "
+    "or on the CPU back-end"
+)
 
 
 class GpuContext:
@@ -37,6 +45,10 @@ class GpuContext:
         The moderngl context; use it only within :meth:`run`.
     renderer, version
         What the driver calls itself, and its OpenGL version as moderngl writes it (330).
+    limits
+        How much it can take at once.
+    is_lost
+        Whether the driver was seen to have lost the context, or it was closed; nothing can be done in it any more.
 
     Raises
     ------
@@ -47,6 +59,9 @@ class GpuContext:
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
         self._programs: dict[ProgramSource, moderngl.Program] = {}
+        # As many as tell what is wrong, where nobody takes them.
+        self._messages: deque[str] = deque(maxlen=64)
+        self.is_lost = False
         self._thread.submit(self._open).result()
 
     def _open(self) -> None:
@@ -62,56 +77,99 @@ class GpuContext:
         self.gl.gc_mode = "context_gc"
         self.renderer = self.gl.info["GL_RENDERER"]
         self.version = self.gl.version_code
+        self.limits = Limits.from_info(self.gl.info)
+        self._driver = DriverState(self.gl, self.function)
+        self._debug_output = DebugOutput(self.gl, self.function)
         self._bind_texture = self.function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
         self._tex_image_2d = self.function("glTexImage2D", *[ctypes.c_uint] * 8, ctypes.c_void_p)
 
-    def function(self, name: str, *arguments: type) -> Callable[..., None]:
-        """An OpenGL function that moderngl does not offer, by its argument types."""
+    def function(self, name: str, *arguments: type, result: type | None = None) -> Any:
+        """An OpenGL function that moderngl does not offer, by the types of its arguments and its result."""
         # On 64-bit systems, the only ones that Blender runs on, there is one calling convention.
-        return ctypes.CFUNCTYPE(None, *arguments)(self._glcontext.load(name))
+        return ctypes.CFUNCTYPE(result, *arguments)(self._glcontext.load(name))
 
     def run(self, work: Callable[[], Result]) -> Result:
-        """Do `work` on the context's thread and wait for it; DeviceError where the driver reports an error."""
+        """Do `work` on the context's thread and wait for it; DeviceError where the driver reports an error or was reset."""
         return self._thread.submit(self._checked, work).result()
 
     def _checked(self, work: Callable[[], Result]) -> Result:
+        if self.is_lost:
+            raise DeviceError(_LOST)
         try:
             result = work()
-        except moderngl.Error as error:
-            raise DeviceError(f"The graphics driver failed ({error}); use the CPU back-end") from error
+        except Exception as error:
+            self._check_driver(error)
+            raise
         finally:
             self.gl.gc()
-        error_name = self.gl.error
-        if error_name != "GL_NO_ERROR":
-            raise DeviceError(f"The graphics driver reports {error_name}; render a smaller image or use the CPU back-end")
+        self._check_driver(None)
         return result
+
+    def _check_driver(self, failure: Exception | None) -> None:
+        """Raise DeviceError where the driver was reset, else for the driver's own part in a failure, else for its errors."""
+        errors, messages = self._driver.errors(), self._debug_output.messages()
+        self._messages += messages
+        if CONTEXT_LOST in errors:
+            self.is_lost = True
+            raise DeviceError(_LOST) from failure
+        if isinstance(failure, moderngl.Error):
+            raise DeviceError(f"The graphics driver failed ({failure}); use the CPU back-end") from failure
+        if errors and failure is None:
+            details = f" ({messages[-1]})" if messages else ""
+            raise DeviceError(
+                f"The graphics driver reports {', '.join(errors)}{details}; render a smaller image or use the CPU back-end"
+            )
+
+    def debug_messages(self) -> list[str]:
+        """The driver's messages on wrong use of OpenGL since the last call, see :class:`debug_output.DebugOutput`."""
+        messages = list(self._messages)
+        self._messages.clear()
+        return messages
+
+    def close(self) -> None:
+        """Give the context back to the driver. It does not wait for that: the driver may hang."""
+        self.is_lost = True
+        self._thread.submit(self._close)
+
+    def _close(self) -> None:
+        # A context is destroyed once it is current nowhere.
+        with self._glcontext:
+            self._glcontext.release()
 
     @property
     def is_software(self) -> bool:
         """Whether OpenGL runs on the CPU here."""
         return any(name in self.renderer.lower() for name in _SOFTWARE)
 
-    def require(self, version: int) -> None:
-        """Raise DeviceError unless the context is of at least this OpenGL version (330)."""
+    def require(self, version: int, draw_buffers: int = 0) -> None:
+        """Raise DeviceError unless the context has at least this OpenGL version (330) and so many render targets."""
         if self.version < version:
             raise DeviceError(
                 f"OpenGL {version // 100}.{version // 10 % 10} is needed but {self.renderer} offers "
                 f"{self.version // 100}.{self.version // 10 % 10}; choose another method"
             )
+        if self.limits.draw_buffers < draw_buffers:
+            raise DeviceError(
+                f"{draw_buffers} render targets at once are needed but {self.renderer} offers {self.limits.draw_buffers}; "
+                "choose another method"
+            )
 
     def program(self, source: ProgramSource) -> moderngl.Program:
-        """The program, compiled once; DeviceError with file and line where the driver rejects it."""
+        """The program, compiled once; DeviceError with files and lines where the driver rejects it."""
         if source not in self._programs:
-            stages = source.sources()
-            texts = {f"{stage}_shader": text.text for stage, text in stages.items()}
+            texts = {stage: text.text for stage, text in source.sources().items()}
             try:
-                self._programs[source] = self.gl.program(**texts, varyings=source.varyings)
+                self._programs[source] = self.gl.program(
+                    vertex_shader=texts["vertex"],
+                    geometry_shader=texts.get("geometry"),
+                    fragment_shader=texts.get("fragment"),
+                    varyings=source.varyings,
+                )
             except moderngl.Error as error:
-                log = str(error)
-                for stage, text in stages.items():
-                    if f"{stage}_shader" in log:
-                        log = text.explain(log)
-                raise DeviceError(f"The driver rejects the program '{source.name}': {log}") from error
+                raise DeviceError(
+                    f"The graphics driver rejects {', '.join(source.files.values())}; choose another method, or install "
+                    f"another driver: {source.explain(str(error))}"
+                ) from error
         return self._programs[source]
 
     def depth_texture(self, size: tuple[int, int]) -> moderngl.Texture:
@@ -133,17 +191,25 @@ def _standalone_glcontext() -> Any:
     return glcontext.default_backend()(mode="standalone", glversion=330)
 
 
-@lru_cache(maxsize=1)
-def _opened() -> GpuContext | DeviceError:
-    try:
-        return GpuContext()
-    except DeviceError as error:
-        return error
+_opening = Lock()
+_shared: GpuContext | DeviceError | None = None
 
 
 def shared_context() -> GpuContext:
-    """The process's context, opened at the first call; DeviceError, the same each time, where it cannot be."""
-    opened = _opened()
-    if isinstance(opened, DeviceError):
-        raise opened
-    return opened
+    """The process's context: opened at the first call, and anew when it was lost.
+
+    DeviceError where it cannot be opened: at the first call, then the same each time; or now, after it was lost.
+    """
+    global _shared
+    with _opening:
+        if _shared is None:
+            try:
+                _shared = GpuContext()
+            except DeviceError as error:
+                _shared = error
+        if isinstance(_shared, DeviceError):
+            raise _shared
+        if _shared.is_lost:
+            lost, _shared = _shared, GpuContext()
+            lost.close()
+        return _shared

@@ -53,6 +53,24 @@ class Source:
         return self.files[number] if number < len(self.files) else str(number)
 
 
+def explain(log: str, sources: Mapping[str, Source]) -> str:
+    """A log of several shaders, each line with the file names of its shader.
+
+    Parameters
+    ----------
+    log
+        What a compiler or linker writes.
+    sources
+        The shaders, each by the line that stands before its messages.
+    """
+    explained = []
+    source = None
+    for line in log.splitlines():
+        source = sources.get(line.strip(), source)
+        explained.append(source.explain(line) if source else line)
+    return "\n".join(explained)
+
+
 def _read(path: str) -> str:
     try:
         return (ROOT / path).read_text(encoding="utf-8")

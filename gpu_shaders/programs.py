@@ -1,27 +1,29 @@
-"""What an OpenGL program is made of, as data: known without a driver."""
+"""OpenGL programs as data: what a method compiles can be listed, and checked, without OpenGL."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
 from dataclasses import dataclass
 
-from .glsl import Source
+from .glsl import Source, explain
+
+_RULER = re.compile(r"[=-]*")
 
 
 @dataclass(frozen=True)
 class ProgramSource:
-    """One program.
+    """One OpenGL program.
 
     Attributes
     ----------
     name
-        For messages.
+        What the method calls it.
     vertex, geometry, fragment
-        Shader files below gpu_shaders/; None where the program has no such stage.
+        Shader files, as paths below gpu_shaders/; None where the program has no such stage.
     constants
-        Name and value of each constant, sorted.
+        Names and values of the ``#define`` lines that all stages get, sorted by name.
     varyings
-        What transform feedback captures, in order.
+        Outputs that transform feedback captures, in the order in which they are written.
     """
 
     name: str
@@ -31,7 +33,22 @@ class ProgramSource:
     constants: tuple[tuple[str, object], ...] = ()
     varyings: tuple[str, ...] = ()
 
+    @property
+    def files(self) -> dict[str, str]:
+        """Paths by stage ("vertex", "geometry", "fragment"), in the order of the stages; only those that there are."""
+        stages = {"vertex": self.vertex, "geometry": self.geometry, "fragment": self.fragment}
+        return {stage: path for stage, path in stages.items() if path is not None}
+
     def sources(self) -> dict[str, Source]:
-        """The stages' texts as the driver gets them, by "vertex", "geometry" and "fragment"."""
-        paths: Mapping[str, str | None] = {"vertex": self.vertex, "geometry": self.geometry, "fragment": self.fragment}
-        return {stage: Source(path, dict(self.constants)) for stage, path in paths.items() if path is not None}
+        """What the driver gets, by stage; DeviceError where a file cannot be read."""
+        constants = dict(self.constants)
+        return {stage: Source(path, constants) for stage, path in self.files.items()}
+
+    def explain(self, log: str) -> str:
+        """What moderngl reports of a driver that rejects the program, on one line and with the names of the files."""
+        headings: dict[str, Source] = {}
+        for stage, source in self.sources().items():
+            # moderngl's heading over what a compiler says, and the one in the logs of some linkers.
+            headings |= {f"{stage}_shader": source, f"{stage.capitalize()} info": source}
+        lines = (line.strip() for line in explain(log, headings).splitlines())
+        return " ".join(line for line in lines if not _RULER.fullmatch(line))

@@ -1,4 +1,4 @@
-"""Checks what can be checked without running: style, format, types, import rules, in Python and Rust.
+"""Checks what can be checked without running: style, format, types, import rules, shaders; in Python, GLSL and Rust.
 
 .venv/bin/python tools/lint.py
 """
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import import_rules
 import rust
+import shader_lint
 from environments import PACKAGES
 from project import ROOT, ToolError, command_line, run
 
@@ -30,6 +31,7 @@ def lint() -> None:
         "types of the package": lambda: check_package_types(programs / "mypy"),
         "types of the tools": lambda: check_tools_types(programs / "mypy"),
         "import rules": lambda: import_rules.main([]),
+        "shaders": lambda: shader_lint.main([]),
         "format of the Rust code": check_rust_format,
         "Rust code": check_rust,
     }
@@ -58,7 +60,11 @@ def check_package_types(mypy: Path) -> None:
 
 def check_tools_types(mypy: Path) -> None:
     tools = ROOT / "tools"
-    run([mypy, *MYPY_OPTIONS, *sorted(tools.glob("*.py"))], env={**os.environ, "MYPYPATH": str(tools)}, cwd=tools)
+    run(
+        [mypy, *MYPY_OPTIONS, *sorted(tools.glob("*.py"))],
+        env={**os.environ, "MYPYPATH": f"{tools}{os.pathsep}{PACKAGES}"},
+        cwd=tools,
+    )
 
 
 def check_rust_format() -> None:

@@ -8,7 +8,6 @@ from types import ModuleType
 from typing import Any
 
 from ..fluid.errors import DeviceError, InputError
-from . import native
 from .method import Backend, Method, MethodInfo
 
 _PACKAGE = __package__.rpartition(".addon.")[0]
@@ -83,6 +82,8 @@ def create_method(name: str) -> tuple[MethodInfo, Method]:
     for folder in _FOLDERS:
         info: MethodInfo = _import(folder, "params").METHOD
         if info.name == name:
+            if info.backend == "gpu":
+                gpu()
             return info, _import(folder, "method").create()
     raise InputError(f"Unknown method '{name}': choose auto, {', '.join(info.name for info in method_infos())}")
 
@@ -102,10 +103,7 @@ def runs_in_software_opengl(info: MethodInfo) -> bool:
 
 def _problem(info: MethodInfo) -> str:
     try:
-        if info.backend == "cpu":
-            native.load()
-        else:
-            gpu().shared_context().require(info.gl_version)
+        create_method(info.name)
     except DeviceError as error:
         return str(error)
     return ""

@@ -7,9 +7,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
-from meniscus.gpu_shaders import glsl
 from meniscus.gpu_shaders.glsl import Source
 from meniscus.gpu_shaders.methods.depth_peeling.method import kernel_constants
 
@@ -95,11 +93,3 @@ def test_depth_textures_keep_every_digit_of_a_float(opengl):
         return np.frombuffer(texture.read(), np.float32)
 
     np.testing.assert_array_equal(opengl.run(work), 2.0**-40 * np.arange(1.5, 5, dtype=np.float32))
-
-
-def test_shader_that_does_not_compile_is_reported_with_file_and_line(opengl, tmp_path, monkeypatch):
-    monkeypatch.setattr(glsl, "ROOT", tmp_path)
-    (tmp_path / "broken.vert").write_text("void main() {\n    gl_Position = vec4(nothing);\n}\n")
-    (tmp_path / "fine.frag").write_text("out vec4 color;\nvoid main() { color = vec4(1.0); }\n")
-    with pytest.raises(DeviceError, match=r"broken\.vert:2"):
-        opengl.run(lambda: opengl.program("broken.vert", "fine.frag", {}))

@@ -6,6 +6,7 @@ import pytest
 
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.gpu_shaders import glsl
+from meniscus.gpu_shaders.programs import ProgramSource
 
 
 @pytest.fixture
@@ -41,6 +42,25 @@ def test_compiler_logs_name_the_files(shader_folder):
     source = glsl.Source("a.glsl", {})
     assert source.explain("1:1(9): error: `y' undeclared") == "b.glsl:1(9): error: `y' undeclared"
     assert source.explain("0(7) : error C1503") == "a.glsl(7) : error C1503"
+
+
+@pytest.mark.parametrize(
+    ("log", "explained"),
+    [
+        (
+            "GLSL Compiler failed\n\ngeometry_shader\n===============\n1:1(9): error: `y' undeclared\n\n",
+            "GLSL Compiler failed geometry_shader b.glsl:1(9): error: `y' undeclared",
+        ),
+        (
+            "GLSL Linker failed\n\nProgram\n=======\nVertex info\n-----------\n0(7) : error C1\nFragment info\n0(8) : error C2",
+            "GLSL Linker failed Program Vertex info a.glsl(7) : error C1 Fragment info c.glsl(8) : error C2",
+        ),
+        ("Program\n=======\nerror: v_x is not written", "Program error: v_x is not written"),
+    ],
+)
+def test_logs_of_programs_name_the_files_of_each_stage(shader_folder, log, explained):
+    shader_folder(a="int a;\n", g='#include "b.glsl"\n', b="int b;\n", c="int c;\n")
+    assert ProgramSource("planted", "a.glsl", "c.glsl", "g.glsl").explain(log) == explained
 
 
 def test_missing_shader_file_is_named(shader_folder):

@@ -191,3 +191,17 @@ def test_progress_rises_to_the_end():
 def test_a_negative_number_of_threads_is_refused():
     with pytest.raises(InputError, match="number of threads"):
         render(threads=-1)
+
+
+def test_a_missing_package_of_opengl_is_one_sentence(monkeypatch):
+    find = registry.importlib.import_module
+
+    def import_module(name):
+        if name.endswith(("gpu_shaders.context", "depth_peeling.method")):
+            raise ImportError("No module named 'moderngl'")
+        return find(name)
+
+    monkeypatch.setattr(registry.importlib, "import_module", import_module)
+    with pytest.raises(DeviceError, match=r"a package is missing \(No module named 'moderngl'\); reinstall the extension"):
+        render(backend="auto", method="depth_peeling")
+    assert [bool(status.problem) for status in meniscus.methods()] == [True, False]

@@ -117,10 +117,15 @@ class DepthPeeling:
         return self._targets
 
 
-@lru_cache(maxsize=1)
 def create() -> DepthPeeling:
     """The method on the process's context; raises DeviceError where there is none that can run it."""
-    return DepthPeeling(shared_context())
+    return _on(shared_context())
+
+
+@lru_cache(maxsize=1)
+def _on(context: GpuContext) -> DepthPeeling:
+    """One that keeps its render targets, until the process gets another context."""
+    return DepthPeeling(context)
 
 
 def _empty(camera: Camera, with_color: bool) -> Surface:
