@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterable
-from contextlib import nullcontext
 
 import moderngl
 
 from .context import GpuContext
+from .step import only_if
 
 _GL_POINTS = 0
 _GL_TRANSFORM_FEEDBACK_BUFFER = 0x8C8E
@@ -45,7 +45,7 @@ class Capture:
         with self._query:
             self._begin(_GL_POINTS)
             for first, count, visible in ranges:
-                with nullcontext() if visible is None else visible.crender:
+                with only_if(visible):
                     self._draw(_GL_POINTS, first, count)
             self._end()
         self._disable(_GL_RASTERIZER_DISCARD)

@@ -119,8 +119,9 @@ float bezier_first_root(float p[KERNEL_DEGREE + 1]) {
     float low = 0.0, high = 1.0;
     bool has_root = false; // a segment with one sign change was met
     int pushed = 0, waiting = 0;
-    int step = 0;
-    for (; step < BEZIER_STEPS; step++) {
+    int steps = 0;
+    for (int step = 0; step < BEZIER_STEPS; step++) {
+        steps = step;
         if (segment[0] >= 0.0)
             break;
         int changes = bezier_sign_changes(segment);
@@ -166,7 +167,7 @@ float bezier_first_root(float p[KERNEL_DEGREE + 1]) {
         low += width * kept.x;
     }
 #if DIAGNOSTICS
-    bezier_note(step);
+    bezier_note(steps);
 #endif
     return low;
 }

@@ -31,7 +31,7 @@ def ball_textures(gl: moderngl.Context, balls: ViewBalls, with_colors: bool) -> 
         "sphere_tx": np.column_stack([balls.centers, balls.radii]).astype(np.float32),
         "density_tx": np.column_stack([balls.weights, balls.kernel_radii]).astype(np.float32),
     }
-    if with_colors:
+    if with_colors and balls.colors is not None:
         arrays["color_tx"] = np.column_stack([balls.colors, np.ones(len(balls), np.float32)])
     return {name: _texture_of_rows(gl, array) for name, array in arrays.items()}
 

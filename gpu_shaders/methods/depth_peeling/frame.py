@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import moderngl
@@ -12,7 +11,7 @@ import numpy.typing as npt
 
 from ...capture import Capture, Range
 from ...context import GpuContext
-from ...step import Step
+from ...step import Step, only_if
 from .programs import LIST_TARGETS, Phase, Variant
 from .targets import Targets
 
@@ -115,7 +114,7 @@ class Frame:
             self._over_balls("kernel", targets.kernel, moderngl.DEPTH_TEST)
         if self._variant.with_starts:
             targets.start.clear()
-            self._gl.blend_equation = moderngl.FUNC_ADD
+            self._blend(moderngl.FUNC_ADD)
             self._over_balls("start", targets.start, moderngl.BLEND, kernel_depth_tx=targets.kernel_depth)
         self._over_screen("begin", targets.begin, kernel_depth_tx=targets.kernel_depth, start_tx=targets.start_density)
         for framebuffer in targets.search if self._variant.options.diagnostics else ():
@@ -173,7 +172,7 @@ class Frame:
         read = {"state_tx": self._state(), "older_state_tx": older, "barrier_tx": self._targets.barrier}
         self._over_screen(f"cells_from_pixels_{phase.name.lower()}", cells.framebuffers[0], **read)
         for level in (1, 2):
-            self._steps["cells_from_cells"].set_uniforms({"smaller_across": cells.factors[level]})
+            self._steps["cells_from_cells"].set_uniforms({"smaller_count": cells.factors[level]})
             self._over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])
 
     def _peel(self, pairs: Pairs) -> int:
@@ -201,16 +200,14 @@ class Frame:
         def one_step(pairs: Pairs, query: moderngl.Query) -> None:
             targets.walk.clear(0.0, 0.0, 0.0, 2.0)
             with query:
-                self._gl.blend_equation = moderngl.FUNC_ADD, moderngl.MIN
+                self._blend(moderngl.FUNC_ADD, moderngl.MIN)
                 self._over_pairs("walk_sum", targets.walk, moderngl.BLEND, pairs, state_tx=self._state())
             read = {"state_tx": self._state(), "sums_tx": targets.sums[0], "barrier_tx": targets.barrier}
             self._over_tiles("walk_step", targets.state_only[1 - self._now], **read)
 
         return self._until_nothing_is_left(one_step, self._keep(pairs, Phase.WALKING), Phase.WALKING)
 
-    def _until_nothing_is_left(
-        self, one_pass: Callable[[Pairs, moderngl.Query], None], pairs: Pairs, phase: Phase
-    ) -> int:
+    def _until_nothing_is_left(self, one_pass: Callable[[Pairs, moderngl.Query], None], pairs: Pairs, phase: Phase) -> int:
         """Repeat a pass over the pairs, each only if the pass before has drawn something; how often.
 
         The processor waits for the graphics processor only once a batch.
@@ -221,7 +218,7 @@ class Frame:
             self._check_cancelled()
             before = self._now
             for query in self._queries:
-                with nullcontext() if previous is None else previous.crender:
+                with only_if(previous):
                     one_pass(pairs, query)
                 self._turn()
                 previous = query
@@ -247,7 +244,7 @@ class Frame:
         targets = self._targets
         self._measure_cells(Phase.DONE)
         targets.gather.clear()
-        self._gl.blend_equation = moderngl.FUNC_ADD
+        self._blend(moderngl.FUNC_ADD)
         self._over_pairs("gather", targets.gather, moderngl.BLEND, self._keep(pairs, Phase.DONE), state_tx=self._state())
         read = {"state_tx": self._state(), "gradient_tx": targets.sums[0], "color_sum_tx": targets.sums[1]}
         self._over_screen("finish", targets.finish, **read)
@@ -263,6 +260,11 @@ class Frame:
             "bezier_iterations": int(iterations[..., 1].sum()),
             "bezier_iterations_max": int(iterations[..., 2].max()),
         }
+
+    def _blend(self, color: int, alpha: int | None = None) -> None:
+        """How fragments are summed from now on."""
+        self._gl.blend_equation = color, color if alpha is None else alpha
+        self._gl.blend_func = moderngl.ONE, moderngl.ONE
 
     def _over_screen(self, name: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
         """Draw every pixel once; a depth buffer is written, never asked."""
@@ -297,7 +299,6 @@ class Frame:
     ) -> None:
         self._gl.enable_only(flags)
         self._gl.depth_func = "<"
-        self._gl.blend_func = moderngl.ONE, moderngl.ONE
         self._render(name, framebuffer, textures, pairs, count)
 
     def _render(

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache, partial
 
-import moderngl
 import numpy as np
 
 from ....addon.fluid.camera import Camera, Region
@@ -40,10 +39,10 @@ class DepthPeeling:
         Balls that a ray may be in before it goes on without a list, 1 to 14.
     """
 
-    def __init__(self, context: GpuContext, options: Options = Options(), list_length: int = LIST_LENGTH) -> None:
+    def __init__(self, context: GpuContext, options: Options | None = None, list_length: int = LIST_LENGTH) -> None:
         context.require(METHOD.gl_version)
         self._context = context
-        self._options = options
+        self._options = options or Options()
         self._list_length = list_length
         self._targets: Targets | None = None
 

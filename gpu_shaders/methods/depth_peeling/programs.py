@@ -92,11 +92,11 @@ class Variant:
         for phase in Phase:
             name = f"cells_from_pixels_{phase.name.lower()}"
             sources.append(
-                replace(
-                    _program("", "screen", "cells_from_pixels", CELL_SIZE=self.cell_size, CELL_PHASE=int(phase)), name=name
-                )
+                replace(_program("", "screen", "cells_from_pixels", CELL_SIZE=self.cell_size, CELL_PHASE=int(phase)), name=name)
             )
-            sources.append(replace(_captured("keep", **balls, **cells, CELL_PHASE=int(phase)), name=f"keep_{phase.name.lower()}"))
+            sources.append(
+                replace(_captured("keep", **balls, **cells, CELL_PHASE=int(phase)), name=f"keep_{phase.name.lower()}")
+            )
         return {source.name: source for source in sources}
 
 

@@ -14,7 +14,7 @@ layout(location = 0) out uvec4 out_state;
 const float WALK_RESOLUTION = 3e-7;
 
 struct Step {
-    float length; // Blender units
+    float advance; // Blender units
     bool arrives;
 };
 
@@ -37,10 +37,10 @@ void main() {
         float resolution = WALK_RESOLUTION * begin;
         float side = state.is_inside ? -1.0 : 1.0;
         Step next = safe_step(side * isovalue - sums.x, sums.y, sums.z);
-        bool is_near = next.length <= resolution;
-        if (next.length < window) {
-            state.depth = (begin + max(next.length, resolution)) * depth_scale;
-            window = max(2.0 * next.length, resolution);
+        bool is_near = next.advance <= resolution;
+        if (next.advance < window) {
+            state.depth = (begin + max(next.advance, resolution)) * depth_scale;
+            window = max(2.0 * next.advance, resolution);
         } else {
             // Nothing in the window; where no ball is either, on to the next one.
             state.depth = (begin + window) * depth_scale;
