@@ -50,7 +50,7 @@ def depth_peeling_with_list_of(monkeypatch, opengl):
     from meniscus.gpu_shaders.methods.depth_peeling import method
 
     def render(length, scene, camera):
-        monkeypatch.setattr(method, "create", lambda: method.DepthPeeling(opengl, length))
+        monkeypatch.setattr(method, "create", lambda: method.DepthPeeling(opengl, list_length=length))
         return meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
 
     return render

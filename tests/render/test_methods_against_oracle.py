@@ -54,7 +54,7 @@ def test_depth_peeling_in_bands_gives_the_same_image(monkeypatch):
     camera = scene.camera("perspective")
     whole = meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
     # Fourteen rows a band; the last has only two.
-    monkeypatch.setattr(method, "_PIXELS_PER_BAND", 14 * camera.width)
+    monkeypatch.setattr(method, "_PIXELS_A_PART", 14 * camera.width)
     in_bands = meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
     judge(in_bands, scene, camera)
     np.testing.assert_array_equal(in_bands.hit, whole.hit)

@@ -9,7 +9,7 @@ import pytest
 
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.gpu_shaders.glsl import Source
-from meniscus.gpu_shaders.methods.depth_peeling.method import kernel_constants
+from meniscus.gpu_shaders.methods.depth_peeling.programs import kernel_constants
 
 
 def run_on_rows(context, library, constants, body, rows):
@@ -34,9 +34,10 @@ def run_on_rows(context, library, constants, body, rows):
     return context.run(work)
 
 
+@pytest.mark.parametrize("stack", [0, 1, 3])
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_bezier_clipping_finds_the_first_root(opengl, kernel):
-    constants = kernel_constants(KERNELS[kernel])
+def test_bezier_clipping_finds_the_first_root(opengl, kernel, stack):
+    constants = {**kernel_constants(KERNELS[kernel]), "BEZIER_STACK": stack, "DIAGNOSTICS": 0}
     degree = constants["KERNEL_DEGREE"]
     polynomials = np.random.default_rng(degree).normal(size=(20000, degree + 1)).astype(np.float32)
     values = ", ".join(f"in_{index}" for index in range(degree + 1))
