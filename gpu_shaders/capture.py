@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterable
+from contextlib import nullcontext
 
 import moderngl
 
 from .context import GpuContext
-from .step import only_if
+from .occlusion import OcclusionQuery
 
 _GL_POINTS = 0
 _GL_TRANSFORM_FEEDBACK_BUFFER = 0x8C8E
 _GL_RASTERIZER_DISCARD = 0x8C89
 
-Range = tuple[int, int, moderngl.Query | None]
+Range = tuple[int, int, OcclusionQuery | None]
 """First point, number of points, and the occlusion query that the draw depends on."""
 
 
@@ -45,7 +46,7 @@ class Capture:
         with self._query:
             self._begin(_GL_POINTS)
             for first, count, visible in ranges:
-                with only_if(visible):
+                with nullcontext() if visible is None else visible.required():
                     self._draw(_GL_POINTS, first, count)
             self._end()
         self._disable(_GL_RASTERIZER_DISCARD)

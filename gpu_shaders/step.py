@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 
 import moderngl
 
 from .context import GpuContext
 from .programs import ProgramSource
-
-
-def only_if(query: moderngl.Query | None) -> AbstractContextManager[object]:
-    """Draw only if the query's draws have left samples, or always where there is no query. Nothing waits for the answer: until
-    the driver knows it may draw all the same.
-    """
-    return nullcontext() if query is None or query.crender is None else query.crender
 
 
 class Step:

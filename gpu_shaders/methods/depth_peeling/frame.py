@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import moderngl
@@ -11,7 +12,8 @@ import numpy.typing as npt
 
 from ...capture import Capture, Range
 from ...context import GpuContext
-from ...step import Step, only_if
+from ...occlusion import OcclusionQueries, OcclusionQuery
+from ...step import Step
 from .programs import LIST_TARGETS, Phase, Variant
 from .targets import Targets
 
@@ -60,7 +62,7 @@ class Frame:
         self._check_cancelled = check_cancelled
         # Which of each pair of targets holds the present state.
         self._now = 0
-        self._queries = [self._gl.query(samples=True) for _ in range(PASSES_A_BATCH)]
+        self._occlusion_queries = OcclusionQueries(context)
         self._capture = Capture(context)
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
         self._pair_buffers = [self._pair_buffer(_PAIRS_A_BALL * ball_count) for _ in range(3)]
@@ -109,6 +111,9 @@ class Frame:
     def _begin(self) -> None:
         """Find the kernel spheres, and where rays start inside; set all rays to their start."""
         targets = self._targets
+        for framebuffer in targets.search if self._variant.options.diagnostics else ():
+            # For the iterations; bits of the float 0 are those of the number 0.
+            framebuffer.clear()
         targets.kernel.clear(depth=1.0)
         if self._variant.options.kernel_spheres:
             self._over_balls("kernel", targets.kernel, moderngl.DEPTH_TEST)
@@ -117,9 +122,6 @@ class Frame:
             self._blend(moderngl.FUNC_ADD)
             self._over_balls("start", targets.start, moderngl.BLEND, kernel_depth_tx=targets.kernel_depth)
         self._over_screen("begin", targets.begin, kernel_depth_tx=targets.kernel_depth, start_tx=targets.start_density)
-        for framebuffer in targets.search if self._variant.options.diagnostics else ():
-            # Bits of the float 0 are those of the number 0.
-            framebuffer.clear()
 
     def _bin(self, starts: npt.NDArray[np.int64], corners: npt.NDArray[np.float32] | None) -> Pairs:
         """The pairs of balls and cells that may matter."""
@@ -130,7 +132,7 @@ class Frame:
         step = self._steps["bin"]
         return self._captured(0, step, step.vertex_array(), ranges)
 
-    def _query_groups(self, corners: npt.NDArray[np.float32]) -> list[moderngl.Query]:
+    def _query_groups(self, corners: npt.NDArray[np.float32]) -> list[OcclusionQuery]:
         """An occlusion query for each group, against the kernel spheres."""
         framebuffer = self._targets.peel[self._now]
         framebuffer.color_mask, framebuffer.depth_mask = (False,) * 4, False
@@ -139,10 +141,9 @@ class Frame:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
         framebuffer.use()
-        queries = []
-        for group in range(len(corners)):
-            queries.append(self._gl.query(any_samples=True))
-            with queries[-1]:
+        queries = self._occlusion_queries.take(len(corners))
+        for group, query in enumerate(queries):
+            with query.asked():
                 array.render(moderngl.TRIANGLE_STRIP, 4, first=4 * group)
         framebuffer.color_mask, framebuffer.depth_mask = (True,) * 4, True
         return queries
@@ -179,8 +180,8 @@ class Frame:
         """Peel and search until nothing is left to peel; how often."""
         targets = self._targets
 
-        def one_peel(pairs: Pairs, query: moderngl.Query) -> None:
-            with query:
+        def one_peel(pairs: Pairs, query: OcclusionQuery) -> None:
+            with query.asked():
                 self._over_pairs("peel", targets.peel[self._now], moderngl.DEPTH_TEST, pairs, state_tx=self._state())
             read = {"state_tx": self._state(), "depth_tx": targets.depths[self._now], "crossing_tx": targets.crossing}
             read.update({f"list_{index}_tx": targets.lists[self._now][index] for index in range(1, LIST_TARGETS)})
@@ -197,9 +198,9 @@ class Frame:
         self._turn()
         self._measure_cells(Phase.WALKING)
 
-        def one_step(pairs: Pairs, query: moderngl.Query) -> None:
+        def one_step(pairs: Pairs, query: OcclusionQuery) -> None:
             targets.walk.clear(0.0, 0.0, 0.0, 2.0)
-            with query:
+            with query.asked():
                 self._blend(moderngl.FUNC_ADD, moderngl.MIN)
                 self._over_pairs("walk_sum", targets.walk, moderngl.BLEND, pairs, state_tx=self._state())
             read = {"state_tx": self._state(), "sums_tx": targets.sums[0], "barrier_tx": targets.barrier}
@@ -207,22 +208,23 @@ class Frame:
 
         return self._until_nothing_is_left(one_step, self._keep(pairs, Phase.WALKING), Phase.WALKING)
 
-    def _until_nothing_is_left(self, one_pass: Callable[[Pairs, moderngl.Query], None], pairs: Pairs, phase: Phase) -> int:
+    def _until_nothing_is_left(self, one_pass: Callable[[Pairs, OcclusionQuery], None], pairs: Pairs, phase: Phase) -> int:
         """Repeat a pass over the pairs, each only if the pass before has drawn something; how often.
 
         The processor waits for the graphics processor only once a batch.
         """
         passes = 0
-        previous: moderngl.Query | None = None
+        previous: OcclusionQuery | None = None
+        queries = self._occlusion_queries.take(PASSES_A_BATCH)
         while True:
             self._check_cancelled()
             before = self._now
-            for query in self._queries:
-                with only_if(previous):
+            for query in queries:
+                with nullcontext() if previous is None else previous.required():
                     one_pass(pairs, query)
                 self._turn()
                 previous = query
-            drawn = [bool(query.samples) for query in self._queries]
+            drawn = [query.answer for query in queries]
             # The first pass that draws no ball is the last that is needed; those after it may have been left out.
             done = len(drawn) if all(drawn) else drawn.index(False) + 1
             self._now = before ^ (done & 1)

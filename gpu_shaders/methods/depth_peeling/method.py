@@ -19,7 +19,7 @@ from .frame import Frame
 from .groups import Groups, ball_groups
 from .options import Options
 from .params import MAX_BALLS, METHOD
-from .programs import LIST_LENGTH, Variant
+from .programs import LIST_LENGTH, LIST_TARGETS, Variant
 from .targets import Targets
 
 # An image of this many pixels takes some 250 MB; a larger one is drawn in parts.
@@ -40,9 +40,9 @@ class DepthPeeling:
     """
 
     def __init__(self, context: GpuContext, options: Options | None = None, list_length: int = LIST_LENGTH) -> None:
-        context.require(METHOD.gl_version)
-        self._context = context
         self._options = options or Options()
+        context.require(METHOD.gl_version, LIST_TARGETS + self._options.diagnostics)
+        self._context = context
         self._list_length = list_length
         self._targets: Targets | None = None
 
@@ -92,7 +92,7 @@ class DepthPeeling:
         )
         textures = ball_textures(self._context.gl, balls, variant.with_colors)
         starts = np.array([0, len(balls)]) if groups is None else groups.starts
-        for region in _parts(camera, self._context.gl.info["GL_MAX_TEXTURE_SIZE"]):
+        for region in _parts(camera, min(self._context.limits.texture_size, self._context.limits.viewport_size)):
             part = replace(camera, region=region).cropped()
             check_cancelled = partial(request.watch, region.y_min / camera.height)
             frame = Frame(self._context, self._targets_for(part), variant, len(balls), check_cancelled)

@@ -33,8 +33,10 @@ void main() {
     out_sums.y = weight * kernel_derivative(x) * -2.0 * from_middle / chord.radius;
     out_sums.z = abs(weight) * kernel_slope_change(chord.peak) / (chord.radius * chord.radius);
 #if KERNEL_DEGREE == 2
-    // A linear kernel's slope jumps where the ray enters the ball.
+    // A linear kernel's slope jumps up where the ray enters a ball, and where it leaves one from a slope downwards.
     if (x <= 0.0)
         out_sums.y = max(weight, 0.0) * KERNEL_LOW * 2.0 * sqrt(chord.peak) / chord.radius;
+    else if (weight > 0.0 && chord.middle + half_length < end)
+        out_sums.y = max(out_sums.y, 0.0);
 #endif
 }

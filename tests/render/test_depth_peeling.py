@@ -1,0 +1,123 @@
+"""What only depth peeling can get wrong: its optimisations, its lists, and what the graphics processor sets limits to."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from judge import judge
+from scenes import SCENES, Scene
+
+import meniscus
+from meniscus.addon.fluid.errors import DeviceError
+from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.gpu_shaders.methods.depth_peeling import frame, groups
+from meniscus.gpu_shaders.methods.depth_peeling.options import Options
+
+SWITCHES = [field.name for field in fields(Options) if field.default is True]
+# Deep lists, large and small balls, hidden ones, rays that start inside, carving.
+OPTION_SCENES = ["lattice_with_droplets", "random_5000", "radii_over_six_orders", "eye_behind_kernel_sphere", "negative_weights"]
+
+
+@pytest.fixture
+def depth_peeling(monkeypatch, opengl):
+    """Renders with depth peeling made with other arguments than usual."""
+    from meniscus.gpu_shaders.methods.depth_peeling import method
+
+    def render(scene, camera, passes=("depth", "normal"), **arguments):
+        monkeypatch.setattr(method, "create", lambda: method.DepthPeeling(opengl, **arguments))
+        return meniscus.render(scene.balls, camera, scene.field, method="depth_peeling", passes=passes)
+
+    return render
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("scene_name", OPTION_SCENES)
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_switching_an_optimisation_off_leaves_the_image_exact(switch, scene_name, projection, depth_peeling):
+    scene = SCENES[scene_name]()
+    camera = scene.camera(projection)
+    image = depth_peeling(scene, camera, options=Options(**{switch: False}))
+    judge(image, scene, camera)
+
+
+def test_each_optimisation_spares_work(depth_peeling, monkeypatch):
+    # Small groups, so that some are wholly hidden.
+    monkeypatch.setattr(groups, "LEAST_BALLS", 16)
+    scene = SCENES["lattice_with_droplets"]()
+    camera = replace(scene.camera("perspective"), width=320, height=240)
+
+    def counts(**switches):
+        return depth_peeling(scene, camera, options=Options(diagnostics=True, **switches)).info.counts
+
+    best = counts()
+    assert best["balls_kept"] < 0.7 * best["balls"]
+    assert counts(kernel_spheres=False)["balls_kept"] == best["balls"]
+    assert counts(kernel_spheres=False)["pairs"] > best["pairs"]
+    groups_only = counts(ball_culling=False)["balls_kept"]
+    assert best["balls_kept"] < groups_only < best["balls"]
+    assert counts(ball_culling=False, group_queries=False)["balls_kept"] == best["balls"]
+    assert counts(tiling=False)["balls_kept"] > best["balls_kept"]
+    assert 2.0 < best["bezier_iterations"] / best["bezier_solves"] < 3.0
+    assert best["bezier_iterations_max"] < 15
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("scene_name", ["ten_balls", "negative_weights", "eye_inside_fluid"])
+def test_rays_whose_lists_are_too_short_arrive_all_the_same(scene_name, kernel, depth_peeling):
+    scene = replace(SCENES[scene_name](), field=meniscus.Field(kernel, 0.25))
+    camera = scene.camera("perspective")
+    image = depth_peeling(scene, camera, list_length=1)
+    assert image.info.counts["overflows"] > 100
+    judge(image, scene, camera)
+
+
+def test_pairs_that_do_not_fit_make_their_buffer_grow(depth_peeling, monkeypatch):
+    monkeypatch.setattr(frame, "_PAIRS_A_BALL", 1)
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera("perspective")
+    image = depth_peeling(scene, camera)
+    assert image.info.counts["pairs"] > image.info.counts["balls"]
+    judge(image, scene, camera)
+
+
+@pytest.mark.parametrize("limit", [40, 96])
+def test_images_wider_than_a_texture_are_drawn_in_parts(limit, depth_peeling, pretend_limits):
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera("perspective")
+    whole = depth_peeling(scene, camera)
+    pretend_limits(texture_size=limit, viewport_size=limit)
+    in_parts = depth_peeling(scene, camera)
+    judge(in_parts, scene, camera)
+    np.testing.assert_array_equal(in_parts.hit, whole.hit)
+
+
+def test_too_few_render_targets_are_an_error(depth_peeling, pretend_limits):
+    scene = SCENES["one_ball"]()
+    pretend_limits(draw_buffers=3)
+    with pytest.raises(DeviceError, match="4 render targets at once are needed"):
+        depth_peeling(scene, scene.camera("perspective"))
+
+
+def many_balls_on_one_pixel(weight: float, count: int) -> Scene:
+    """Balls that all lie over one another around a point, some of them exactly in the same place."""
+    positions = np.random.default_rng(11).normal(0, 1e-3, (count, 3))
+    positions[::2] = 0
+    # Where the ray of a pixel of 1/12 passes.
+    positions += [1 / 24, 0, 1 / 24]
+    return Scene(meniscus.Balls(positions, 0.03, np.full(count, weight)), view_height=2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("weight", [1.0, 0.5e-6])
+def test_a_million_balls_on_one_pixel(weight, depth_peeling):
+    """With the lesser weight no ball is a kernel sphere, and the surface is where nearly half of them have been met."""
+    scene = many_balls_on_one_pixel(weight, 1_000_000)
+    camera = replace(scene.camera("perspective"), width=32, height=24)
+    image = depth_peeling(scene, camera)
+    expected = meniscus.render(scene.balls, camera, scene.field, method="tile_caster")
+    np.testing.assert_array_equal(image.hit, expected.hit)
+    assert np.count_nonzero(image.hit) == 1
+    np.testing.assert_allclose(image["depth"][image.hit], expected["depth"][image.hit], atol=3e-5)
