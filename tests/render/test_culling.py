@@ -10,7 +10,9 @@ from judge import expected, is_undecidable
 from scenes import Scene
 
 import meniscus
+from meniscus.addon.render.registry import method_infos
 
+METHODS = [info.name for info in method_infos()]
 WIDTH, HEIGHT = 480, 360
 PIXELS = 1500
 
@@ -51,10 +53,11 @@ def mixed(seed: int) -> Scene:
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("make", [carved, carved_by_one, mixed])
-def test_what_is_hidden_could_not_be_seen(make, seed, projection):
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_hidden_could_not_be_seen(method, make, seed, projection):
     scene = make(seed)
     camera = replace(scene.camera(projection), width=WIDTH, height=HEIGHT)
-    image = meniscus.render(scene.balls, camera, scene.field, method="tile_caster")
+    image = meniscus.render(scene.balls, camera, scene.field, method=method)
     assert image.hit.mean() > 0.2
     pixels = np.random.default_rng(seed).choice(WIDTH * HEIGHT, PIXELS, replace=False)
     want = expected(scene.balls, scene.field, camera, pixels)
