@@ -5,8 +5,8 @@
 // polynomial when all before it is done.
 
 const float BEZIER_NO_ROOT = 2.0;
-// Below this width a root is located; one secant step follows, which squares the error.
-const float BEZIER_WIDTH = 1e-4;
+// Below this width a root is located; the step that follows cubes the error.
+const float BEZIER_WIDTH = 1e-3;
 // Each step at least halves a segment; 20 halvings reach the resolution of a float, for several segments.
 const int BEZIER_STEPS = 96;
 
@@ -71,10 +71,13 @@ void bezier_split(inout float p[KERNEL_DEGREE + 1], out float right[KERNEL_DEGRE
     }
 }
 
-// The root of a segment so narrow that it is straight, or touches the axis; as a share of it.
-float bezier_chord_root(float p[KERNEL_DEGREE + 1]) {
-    float rise = p[KERNEL_DEGREE] - p[0];
-    return rise > 0.0 ? clamp(-p[0] / rise, 0.0, 1.0) : 0.5;
+// The root of a narrow segment, as a share of it: that of the parabola with the same ends and the same slope at the first.
+// A segment that only touches the axis has it anywhere.
+float bezier_parabola_root(float p[KERNEL_DEGREE + 1]) {
+    float slope = float(KERNEL_DEGREE) * (p[1] - p[0]);
+    float bend = p[KERNEL_DEGREE] - p[0] - slope;
+    float divisor = slope + sqrt(max(slope * slope - 4.0 * bend * p[0], 0.0));
+    return divisor > 0.0 ? clamp(-2.0 * p[0] / divisor, 0.0, 1.0) : 0.5;
 }
 
 // Narrows a segment with one sign change, hence one root, to the part that has it: what the convex hull leaves, or where that
@@ -147,7 +150,7 @@ float bezier_first_root(float p[KERNEL_DEGREE + 1]) {
         }
         float width = high - low;
         if (width <= BEZIER_WIDTH) {
-            low += width * bezier_chord_root(segment);
+            low += width * bezier_parabola_root(segment);
             break;
         }
         vec2 kept = vec2(0.0, 0.5);

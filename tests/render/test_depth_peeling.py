@@ -17,7 +17,13 @@ from meniscus.gpu_shaders.methods.depth_peeling.options import Options
 
 SWITCHES = [field.name for field in fields(Options) if field.default is True]
 # Deep lists, large and small balls, hidden ones, rays that start inside, carving.
-OPTION_SCENES = ["lattice_with_droplets", "random_5000", "radii_over_six_orders", "eye_behind_kernel_sphere", "negative_weights"]
+OPTION_SCENES = [
+    "lattice_with_droplets",
+    "random_5000",
+    "radii_over_six_orders",
+    "eye_behind_kernel_sphere",
+    "negative_weights",
+]
 
 
 @pytest.fixture

@@ -12,10 +12,7 @@ from ....addon.fluid.camera import Camera
 from ....addon.fluid.field import Field
 from ....addon.fluid.view_balls import ViewBalls
 from .groups import spatial_order
-from .programs import BALL_TEXTURE_WIDTH, CELL_SIZES
-
-CELLS_A_BALL = 2
-"""A fine cell is as large as a middling ball would need to lie across so many of them at most."""
+from .programs import BALL_TEXTURE_WIDTH
 
 
 def in_spatial_order(balls: ViewBalls) -> ViewBalls:
@@ -58,14 +55,11 @@ class BallDistances:
         The greatest distance at which a ray starts, scaled.
     with_starts
         Whether a ray may start inside the fluid, or a ball has a negative weight.
-    cell_size
-        Side of a fine cell for these balls, pixels.
     """
 
     depth_scale: float
     farthest_start: float
     with_starts: bool
-    cell_size: int
 
     @classmethod
     def measure(cls, balls: ViewBalls, camera: Camera) -> BallDistances:
@@ -74,10 +68,7 @@ class BallDistances:
         start = camera.clip_start * float(np.hypot.reduce([1.0, *_steepest_slope(camera)]))
         scale = 2.0 ** -(np.ceil(np.log2(max(float(np.max(distances + balls.radii)), start))) + 1)
         may_start_inside = bool(np.any(distances - balls.radii <= start * (1 + 1e-5)))
-        pixels = balls.radii / camera.pixel_size[1] / (distances if camera.is_perspective else 1.0)
-        needed = 2 * float(np.median(pixels)) / CELLS_A_BALL
-        cell_size = next((size for size in CELL_SIZES if size >= needed), CELL_SIZES[-1])
-        return cls(float(scale), start * float(scale), may_start_inside or bool(np.any(balls.weights < 0)), cell_size)
+        return cls(float(scale), start * float(scale), may_start_inside or bool(np.any(balls.weights < 0)))
 
 
 def _steepest_slope(camera: Camera) -> tuple[float, float]:

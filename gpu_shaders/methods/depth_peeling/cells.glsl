@@ -1,13 +1,14 @@
-// Cells: squares of the image, in three levels: fine ones of CELL_SIZE pixels, coarse ones of COARSE_FACTOR times that, and the
-// whole image. For each a texture holds the range of distances that its pixels still ask for: the least of the distances that
+// Cells: squares of the image, in levels: of CELL_SIZE pixels, of CELL_FACTOR times that, and once more; the last level's only
+// cell is the whole image. For each level a texture holds the range of distances that its pixels still ask for: the least of the distances that
 // they have reached, the greatest of those that they want to reach. Where none asks for anything, the range is empty.
 // A cell's number: level (2 bits), y (15 bits), x (15 bits).
 
 uniform sampler2D cells_0_tx;
 uniform sampler2D cells_1_tx;
 uniform sampler2D cells_2_tx;
+uniform sampler2D cells_3_tx;
 
-const uint WHOLE_IMAGE = 2u;
+const uint WHOLE_IMAGE = 3u;
 const int CELLS_ACROSS = 4; // at most, of one ball
 const vec2 EMPTY_RANGE = vec2(4.0, -4.0);
 
@@ -24,13 +25,17 @@ ivec2 cell_position(uint number) {
 }
 
 float cell_size(uint level) {
-    return level == 0u ? float(CELL_SIZE) : level == 1u ? float(CELL_SIZE * COARSE_FACTOR) : 32768.0;
+    return level == 0u   ? float(CELL_SIZE)
+           : level == 1u ? float(CELL_SIZE * CELL_FACTOR)
+           : level == 2u ? float(CELL_SIZE * CELL_FACTOR * CELL_FACTOR)
+                         : 32768.0;
 }
 
 vec2 cell_range(uint level, ivec2 cell) {
     return level == 0u   ? texelFetch(cells_0_tx, cell, 0).xy
            : level == 1u ? texelFetch(cells_1_tx, cell, 0).xy
-                         : texelFetch(cells_2_tx, cell, 0).xy;
+           : level == 2u ? texelFetch(cells_2_tx, cell, 0).xy
+                         : texelFetch(cells_3_tx, cell, 0).xy;
 }
 
 // Whether a cell asks for anything between two scaled distances.

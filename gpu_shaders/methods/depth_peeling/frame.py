@@ -66,7 +66,7 @@ class Frame:
         self._capture = Capture(context)
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
         self._pair_buffers = [self._pair_buffer(_PAIRS_A_BALL * ball_count) for _ in range(3)]
-        self._cells = targets.cells(variant.cell_size)
+        self._cells = targets.cells
 
     def bind(self, textures: dict[str, moderngl.Texture], uniforms: dict[str, object]) -> None:
         """Give every step the balls and the camera."""
@@ -172,7 +172,7 @@ class Frame:
         cells, older = self._cells, self._targets.lists[1 - self._now][0]
         read = {"state_tx": self._state(), "older_state_tx": older, "barrier_tx": self._targets.barrier}
         self._over_screen(f"cells_from_pixels_{phase.name.lower()}", cells.framebuffers[0], **read)
-        for level in (1, 2):
+        for level in range(1, len(cells.levels)):
             self._steps["cells_from_cells"].set_uniforms({"smaller_count": cells.factors[level]})
             self._over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])
 

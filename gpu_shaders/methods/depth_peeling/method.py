@@ -85,7 +85,6 @@ class DepthPeeling:
         variant = Variant(
             field.density_kernel,
             self._options,
-            distances.cell_size,
             self._list_length,
             with_colors=surface.color is not None,
             with_starts=distances.with_starts,

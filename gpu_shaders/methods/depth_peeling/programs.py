@@ -16,10 +16,10 @@ BALL_TEXTURE_WIDTH = 4096
 LIST_TARGETS = 4
 """N_buf render targets of four words hold the state, which takes two, and 4 N_buf - 2 = 14 ids, as in the paper."""
 LIST_LENGTH = 4 * LIST_TARGETS - 2
-CELL_SIZES = (8, 16, 32)
-"""Sides of a fine cell that a frame chooses from, pixels."""
-COARSE_FACTOR = 8
-"""Fine cells along the side of a coarse one."""
+CELL_SIZE = 8
+"""Side of the smallest cells, pixels."""
+CELL_FACTOR = 4
+"""Cells along the side of one of the next level."""
 BEZIER_STACK = 3
 
 
@@ -39,8 +39,6 @@ class Variant:
     ----------
     kernel, options
         The density kernel and the optimisations.
-    cell_size
-        Side of a fine cell, pixels.
     list_length
         Balls that a ray may be in before it walks, 1 to LIST_LENGTH.
     with_colors
@@ -51,7 +49,6 @@ class Variant:
 
     kernel: Kernel
     options: Options = Options()
-    cell_size: int = CELL_SIZES[1]
     list_length: int = LIST_LENGTH
     with_colors: bool = False
     with_starts: bool = False
@@ -61,7 +58,7 @@ class Variant:
         options = self.options
         kernel = kernel_constants(self.kernel)
         balls = {"BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH, "TIGHT_RECTANGLES": int(options.tight_rectangles)}
-        cells = {"CELL_SIZE": self.cell_size, "COARSE_FACTOR": COARSE_FACTOR, "BALL_CULLING": int(options.ball_culling)}
+        cells = {"CELL_SIZE": CELL_SIZE, "CELL_FACTOR": CELL_FACTOR, "BALL_CULLING": int(options.ball_culling)}
         pairs = {**balls, **cells, "FROM_PAIRS": 1, "KERNEL_SPHERES": 0, "STARTS_ONLY": 0}
         all_balls = {**balls, "FROM_PAIRS": 0, "KERNEL_SPHERES": 0, "STARTS_ONLY": 0}
         begin = {"KERNEL_SPHERES": int(options.kernel_spheres), "WITH_STARTS": int(self.with_starts)}
@@ -92,7 +89,7 @@ class Variant:
         for phase in Phase:
             name = f"cells_from_pixels_{phase.name.lower()}"
             sources.append(
-                replace(_program("", "screen", "cells_from_pixels", CELL_SIZE=self.cell_size, CELL_PHASE=int(phase)), name=name)
+                replace(_program("", "screen", "cells_from_pixels", CELL_SIZE=CELL_SIZE, CELL_PHASE=int(phase)), name=name)
             )
             sources.append(
                 replace(_captured("keep", **balls, **cells, CELL_PHASE=int(phase)), name=f"keep_{phase.name.lower()}")
@@ -104,9 +101,8 @@ def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     switches = [name for name in Options.__dataclass_fields__ if name != "diagnostics"]
     options = [Options(), Options(diagnostics=True), *(Options(**{name: False}) for name in switches)]
-    for kernel, cell_size, flag in product(KERNELS.values(), CELL_SIZES, (False, True)):
-        for option in options:
-            yield from Variant(kernel, option, cell_size, with_colors=flag, with_starts=flag).programs().values()
+    for kernel, option, flag in product(KERNELS.values(), options, (False, True)):
+        yield from Variant(kernel, option, with_colors=flag, with_starts=flag).programs().values()
 
 
 def kernel_constants(kernel: Kernel) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 
 from ...context import GpuContext
-from .programs import CELL_SIZES, COARSE_FACTOR, LIST_TARGETS
+from .programs import CELL_FACTOR, CELL_SIZE, LIST_TARGETS
 
 
 class Targets:
@@ -42,29 +42,30 @@ class Targets:
         self.walk = gl.framebuffer(self.sums[:1])
         self.gather = gl.framebuffer(self.sums)
         self.finish = gl.framebuffer(self.outputs)
-        self._cells: dict[int, CellTargets] = {}
-        self._gl = gl
-
-    def cells(self, cell_size: int) -> CellTargets:
-        """Cells of this size."""
-        assert cell_size in CELL_SIZES
-        if cell_size not in self._cells:
-            self._cells[cell_size] = CellTargets(self._gl, self.size, cell_size)
-        return self._cells[cell_size]
+        self.cells = CellTargets(gl, size)
 
 
 class CellTargets:
-    """What the cells of the image ask for, in three levels; see cells.glsl."""
+    """What the cells of the image ask for, level by level; see cells.glsl.
 
-    def __init__(self, gl: moderngl.Context, size: tuple[int, int], cell_size: int) -> None:
+    Attributes
+    ----------
+    across, down
+        The numbers of the smallest cells along the image's sides.
+    levels, framebuffers
+        A texture and its framebuffer for each level, from the smallest cells to the whole image.
+    factors
+        How many pixels, or cells of the level before, lie along a cell's side.
+    """
+
+    def __init__(self, gl: moderngl.Context, size: tuple[int, int]) -> None:
         sizes = [size]
-        for factor in (cell_size, COARSE_FACTOR):
+        for factor in (CELL_SIZE, CELL_FACTOR, CELL_FACTOR):
             sizes.append((-(-sizes[-1][0] // factor), -(-sizes[-1][1] // factor)))
         self.across, self.down = sizes[1]
         self.levels = [_plain(gl.texture(level_size, 2, dtype="f4")) for level_size in (*sizes[1:], (1, 1))]
         self.framebuffers = [gl.framebuffer([texture]) for texture in self.levels]
-        # How many cells of the level before lie across one.
-        self.factors = [cell_size, COARSE_FACTOR, max(sizes[2])]
+        self.factors = [CELL_SIZE, CELL_FACTOR, CELL_FACTOR, max(sizes[3])]
 
     @property
     def textures(self) -> dict[str, moderngl.Texture]:
