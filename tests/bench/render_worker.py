@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 import meniscus
-from bench.scenes import SCENES, three_quarter_camera
+from bench.scenes import SCENES
 from bench.worker import Message, serve
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.render import native
@@ -30,7 +30,7 @@ def render(request: Message) -> Message:
     """Render once: the milliseconds of the stages and of the whole call, the number of balls, the share of pixels hit."""
     balls = balls_of(request["scene"])
     field = request["field"] or SCENES[request["scene"]].field
-    camera = three_quarter_camera(balls, request["width"], request["height"])
+    camera = SCENES[request["scene"]].camera(balls, request["width"], request["height"])
     start = time.perf_counter()
     image = meniscus.render(balls, camera, field, method=request["method"], threads=request["threads"])
     whole = (time.perf_counter() - start) * 1e3
