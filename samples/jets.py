@@ -32,7 +32,7 @@ NOZZLE_RADIUS = 0.025
 SPREAD = 0.016
 """Standard deviation of the velocity in each direction, of the speed: it tears the jets into droplets."""
 BOUNCE, BOUNCE_SPREAD = 0.15, 0.08
-"""Share of the speed that a particle keeps when it bounces, and standard deviation of what it gets in each direction, of the speed."""
+"""Of the speed: what a particle keeps when it bounces, and the standard deviation of what it gets in each direction."""
 EYE, TARGET = (0.0, -6.4, 2.0), (0.0, 0.0, 0.88)
 """A camera that sees the full fountain, Blender units."""
 RADIUS_RANGE = (0.010, 0.024)

@@ -31,9 +31,8 @@ TILT = 0.9
 BURIED_RADIUS = 15.5
 """Distance of a beta carbon from the bundle's axis, angstrom, up to which its residue is greasy."""
 BURIED = {"LEU": 0.30, "ALA": 0.17, "VAL": 0.22, "ILE": 0.13, "PHE": 0.09, "MET": 0.06, "CYS": 0.03}
-EXPOSED = {
-    "GLU": 0.20, "LYS": 0.18, "ARG": 0.10, "GLN": 0.12, "ASP": 0.07, "ASN": 0.07, "SER": 0.10, "THR": 0.08, "VAL": 0.04, "LEU": 0.04,
-}  # fmt: skip
+EXPOSED = {"GLU": 0.20, "LYS": 0.18, "ARG": 0.10, "GLN": 0.12, "ASP": 0.07, "ASN": 0.07, "SER": 0.10, "THR": 0.08}
+EXPOSED |= {"VAL": 0.04, "LEU": 0.04}
 """How often residues occur."""
 
 RADII = {"C": 1.70, "N": 1.55, "O": 1.52, "S": 1.80}
@@ -41,7 +40,7 @@ RADII = {"C": 1.70, "N": 1.55, "O": 1.52, "S": 1.80}
 COLORS = {"C": (0.30, 0.32, 0.34), "N": (0.06, 0.13, 0.70), "O": (0.70, 0.05, 0.04), "S": (0.75, 0.55, 0.04)}
 """After Corey, Pauling and Koltun, linear Rec.709."""
 RADIUS, ISOVALUE = 0.8, 0.6
-"""Influence radius, van der Waals radii, and T of Wyvill's kernel: a lone atom is a third of its van der Waals radius wide, so that
+"""Influence radius, van der Waals radii, and T of Wyvill's kernel. An atom alone then has a third of its van der Waals radius:
 those that are bonded would not touch as spheres, and blend along their bonds as metaballs."""
 UNIT = 0.1
 """Blender units in an angstrom."""

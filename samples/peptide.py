@@ -156,7 +156,7 @@ def place(along: Sequence[FloatArray], length: float, angle: float, torsion: npt
 
 
 def helix(residues: int) -> FloatArray:
-    """(residues, 5, 3) atoms of an alpha helix of at least four residues, in the order of BACKBONE, centred in the origin, its axis along z."""
+    """(residues, 5, 3) atoms of an alpha helix in the order of BACKBONE, around z and the origin; four residues at least."""
     chain: list[FloatArray] = [np.array([0.0, 0.0, 0.0]), np.array([1.458, 0.0, 0.0])]
     chain.append(chain[1] + 1.525 * np.array([-np.cos(np.radians(111.2)), np.sin(np.radians(111.2)), 0.0]))
     for _ in range(residues):

@@ -34,7 +34,7 @@ DENSE_JITTER = 0.25
 """Greatest displacement of a ball along an axis in a dense scene, spacings."""
 DAM_BREAK_FRAME = 26
 """Where the wave has hit the pillar: a block, thin sheets and lone droplets at once."""
-FIGURE_10_SPACING, FIGURE_10_FRAME = 0.0286, 26
+FIGURE_10_SPACING, FIGURE_10_FRAME = 0.0286, 22
 """Of the dam break with about 120,000 particles: their distance at the start, Blender units, and the frame that is shown."""
 
 
@@ -157,7 +157,7 @@ def _block(name: str, count: int) -> Scene:
 
 def kanamori_figure_2_balls() -> meniscus.Balls:
     """B0 to B3 in the plane y = 0: a ray along x through the origin enters B2, B1 and B3 in turn, then leaves them."""
-    return meniscus.Balls([[-0.5, 0, 1.6], [0.1, 0, 0.8], [-0.8, 0, -0.85], [0.55, 0, -0.45]], [0.8, 1.05, 1.1, 1.0])
+    return meniscus.Balls([[-0.6, 0, 1.6], [-0.05, 0, 0.8], [-0.8, 0, -0.8], [0.45, 0, -0.45]], [0.8, 1.05, 1.1, 1.0])
 
 
 def _kanamori_scenes() -> tuple[Scene, ...]:
@@ -173,7 +173,7 @@ def _kanamori_scenes() -> tuple[Scene, ...]:
         *table_1,
         Scene("kanamori_figure_2", kanamori_figure_2_balls, view=View((0.0, -6.0, 0.0), (0.0, 0.0, 0.25), 0.6)),
         Scene("kanamori_figure_10_whole", tank, splash, view=View((4.6, -6.2, 3.2), (2.0, 0.5, 0.95), 0.50)),
-        Scene("kanamori_figure_10_close", tank, splash, view=View((4.6, -6.2, 3.2), (3.3, 0.6, 1.2), 0.20)),
+        Scene("kanamori_figure_10_close", tank, splash, view=View((4.6, -6.2, 3.2), (3.2, 0.6, 1.05), 0.25)),
         Scene(
             "kanamori_figure_11",
             molecule.balls,
