@@ -7,7 +7,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own
 .PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
-	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 14
+	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
 	@echo "HOST is one of: $(HOSTS)"
 
 setup: ## Make the development environment in .venv, or bring it up to date
