@@ -4,10 +4,10 @@ VENV := .venv/bin/python
 HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast fuzz bench bench-peers lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
-	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 14
+	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
 	@echo "HOST is one of: $(HOSTS)"
 
 setup: ## Make the development environment in .venv, or bring it up to date
@@ -30,6 +30,9 @@ bench: setup ## Time Meniscus on named scenes (ARGS="--scenes random_1k --repeat
 
 bench-peers: setup ## Time what users have today beside Meniscus, and judge both by the oracle
 	@PYTHONPATH=tests:tools $(VENV) -m bench.run_peers $(ARGS)
+
+bench-pictures: setup ## Render the pictures of docs/kanamori_2008.md anew (ARGS="--only figure_1")
+	@PYTHONPATH=tests $(VENV) -m bench.paper_pictures $(ARGS)
 
 lint: setup ## Check style, format, types, import rules and shaders
 	@$(VENV) tools/lint.py

@@ -118,11 +118,15 @@ def add_points(
 
 
 def add_balls(scene: bpy.types.Scene, name: str, balls: Balls) -> bpy.types.Object:
-    """An object whose vertices are `balls`, with the attributes radius (the influence radius), velocity and id where known."""
-    attributes = {"radius": balls.radii, "velocity": balls.velocities, "id": balls.ids}
+    """An object whose vertices are `balls`, with the attributes radius (the influence radius), velocity, id and color where
+    known.
+    """
+    attributes = {"radius": balls.radii, "velocity": balls.velocities, "id": balls.ids, "color": balls.colors}
     known = {attribute: values for attribute, values in attributes.items() if values is not None}
     item = add_points(scene, name, balls.positions, known)
     use_as_fluid(item, source="POINTS", radius_mode="ATTRIBUTE", radius_attribute="radius")
+    if balls.colors is not None:
+        use_as_fluid(item, color_mode="ATTRIBUTE", color_attribute="color")
     return item
 
 
@@ -133,6 +137,14 @@ def use_as_fluid(item: bpy.types.Object, **settings: Any) -> None:
     item.meniscus.use_fluid = True
     for name, value in settings.items():
         setattr(item.meniscus, name, value)
+
+
+def use_field(scene: bpy.types.Scene, **settings: Any) -> None:
+    """Give `scene` the density field with the given settings of ``scene.meniscus``, where this package is registered."""
+    if not hasattr(bpy.types.Scene, "meniscus"):
+        return
+    for name, value in settings.items():
+        setattr(scene.meniscus, name, value)
 
 
 def add_camera(scene: bpy.types.Scene, eye: Point, target: Point, lens: float = 50.0) -> bpy.types.Object:

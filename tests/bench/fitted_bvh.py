@@ -21,7 +21,7 @@ import meniscus
 from . import machine, report
 from .accuracy import Rays, pixel_rays
 from .renderers import PREPARE_LIMIT
-from .scenes import SCENES, SIZES, three_quarter_camera
+from .scenes import SCENES, SIZES
 from .timing import Outcome, Plan, Sample, Statistics, interleave, statistics_by_stage
 from .worker import Message, Worker, serve
 
@@ -113,7 +113,7 @@ def _balls(scene: str) -> meniscus.Balls:
 def _tree_and_rays(scene: str) -> tuple[meniscus.FittedBvh, Rays]:
     balls = _balls(scene)
     tree = meniscus.FittedBvh(balls, SCENES[scene].field)
-    camera = three_quarter_camera(balls, *SIZES[0])
+    camera = SCENES[scene].camera(balls, *SIZES[0])
     rays, _ = pixel_rays(camera, np.arange(camera.width * camera.height))
     hits = tree.first_hit(rays.origins, rays.directions)
     is_hit = np.isfinite(hits.t)

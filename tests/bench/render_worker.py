@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 import meniscus
-from bench.scenes import SCENES, three_quarter_camera
+from bench.scenes import SCENES
 from bench.worker import Message, serve
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.render import native
@@ -27,10 +27,14 @@ def prepare(request: Message) -> Message:
 
 
 def render(request: Message) -> Message:
-    """Render once: the milliseconds of the stages and of the whole call, the number of balls, the share of pixels hit."""
+    """Render once: the milliseconds of the stages and of the whole call, the number of balls, the share of pixels hit, and what
+    the method counted.
+    """
+    if request["switches"]:
+        use_switches(**request["switches"])
     balls = balls_of(request["scene"])
     field = request["field"] or SCENES[request["scene"]].field
-    camera = three_quarter_camera(balls, request["width"], request["height"])
+    camera = SCENES[request["scene"]].camera(balls, request["width"], request["height"])
     start = time.perf_counter()
     image = meniscus.render(balls, camera, field, method=request["method"], threads=request["threads"])
     whole = (time.perf_counter() - start) * 1e3
@@ -40,7 +44,18 @@ def render(request: Message) -> Message:
         "milliseconds": {**image.info.milliseconds, "render": whole},
         "balls": len(balls),
         "hit": float(image.hit.mean()),
+        "counts": image.info.counts,
     }
+
+
+@cache
+def use_switches(**switches: bool) -> None:
+    """From now on Depth Peeling has these options in this process, which serves no other."""
+    from meniscus.gpu_shaders.context import shared_context
+    from meniscus.gpu_shaders.methods.depth_peeling import method, options
+
+    switched = method.DepthPeeling(shared_context(), options.Options(**switches))
+    method.create = lambda: switched
 
 
 def describe(request: Message) -> Message:

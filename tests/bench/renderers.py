@@ -54,5 +54,6 @@ class Renderers:
         if self._scenes.get(variant) != picture.scene:
             worker.ask({"do": "prepare", "scene": picture.scene}, PREPARE_LIMIT)
             self._scenes[variant] = picture.scene
-        request = {"do": "render", "method": variant.method, "threads": variant.threads, "save": save, **vars(picture)}
+        how = {"method": variant.method, "threads": variant.threads, "switches": dict(variant.switches)}
+        request = {"do": "render", **how, "save": save, **vars(picture)}
         return worker.ask(request, limit)

@@ -74,15 +74,19 @@ def machine_text(machine: dict[str, Any]) -> str:
     return "\n\n".join(lines)
 
 
-def publish(name: str, data: dict[str, Any], text: str, into_document: bool) -> None:
-    """Print the report, write it to out/NAME.json and out/NAME.md, and into its place in the document if so asked."""
+def publish(name: str, data: dict[str, Any], text: str, into_document: bool, page: Path | None = None) -> None:
+    """Print the report, write it to out/NAME.json and out/NAME.md, and into its place in the page if so asked.
+
+    The page is DOCUMENT if left out.
+    """
+    page = page or DOCUMENT
     with whole_file(OUT / f"{name}.json") as path:
         path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     with whole_file(OUT / f"{name}.md") as path:
         path.write_text(text + "\n", encoding="utf-8")
     if into_document:
-        document = with_section(DOCUMENT.read_text(encoding="utf-8"), name, text)
-        with whole_file(DOCUMENT) as path:
+        document = with_section(page.read_text(encoding="utf-8"), name, text)
+        with whole_file(page) as path:
             path.write_text(document, encoding="utf-8")
     print(f"\n{text}\n\nWritten: {OUT / name}.json and .md", flush=True)
 

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
-from typing import Any
+from dataclasses import asdict
 
-from . import fitted_bvh, machine, report
+from . import fitted_bvh, kanamori_2008, machine, report
+from .measure import WHOLE, Row, measure
 from .options import parser
 from .renderers import Picture, Renderers
 from .scenes import SCENES
-from .timing import Plan, Sample, Statistics, interleave, statistics_by_stage
-from .variants import Variant, default_methods, variants
+from .timing import Plan
+from .variants import default_methods, variants
 
 DEFAULT_SCENES = tuple(name for name in SCENES if not name.startswith("block_"))
-WHOLE = "render"
-"""The stage that is the whole call."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One variant on one picture: milliseconds by stage, and why there are none or no more."""
-
-    picture: Picture
-    variant: Variant
-    stages: dict[str, Statistics]
-    facts: dict[str, Any]
-    problem: str
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -36,38 +22,25 @@ def main(arguments: list[str] | None = None) -> None:
     options = options_parser.parse_args(arguments)
     about = machine.describe()
     print(about["warning"], flush=True)
-    rows = []
     plan = Plan(options.repeats, options.budget)
+    own = [scene for scene in options.scenes if scene not in kanamori_2008.SCENE_NAMES]
+    rows = []
     with Renderers("bench") as renderers:
         described = renderers.describe()
         about["gl_renderer"] = described["gl_renderer"]
         methods = options.method or default_methods(described)
-        for scene in options.scenes:
+        for scene in own:
             chosen = variants(scene, methods, described["simd_paths"])
             for size in options.sizes:
                 print(f"{scene} {size[0]}x{size[1]}", flush=True)
                 rows += measure(renderers, Picture(scene, *size), chosen, plan, options.limit)
-    trees = fitted_bvh.measure(options.scenes, plan, options.limit, report.OUT / "bench.log")
-    data = {"machine": about, "options": vars(options), "rows": list(map(asdict, rows)), "trees": list(map(asdict, trees))}
-    parts = [report.machine_text(about), table_of(rows)] + ([fitted_bvh.table_of(trees)] if trees else [])
-    report.publish("bench", data, "\n\n".join(parts), options.update_docs)
-
-
-def measure(renderers: Renderers, picture: Picture, chosen: Sequence[Variant], plan: Plan, limit: float) -> list[Row]:
-    """Time the variants on a picture in turn."""
-    facts: dict[Variant, dict[str, Any]] = {variant: {} for variant in chosen}
-
-    def render(variant: Variant) -> Sample:
-        reply = renderers.render(variant, picture, limit)
-        milliseconds: Sample = reply.pop("milliseconds")
-        facts[variant] = reply
-        return milliseconds
-
-    outcomes = interleave({variant: partial(render, variant) for variant in chosen}, plan)
-    return [
-        Row(picture, variant, statistics_by_stage(outcome), facts[variant], outcome.problem)
-        for variant, outcome in outcomes.items()
-    ]
+    trees = fitted_bvh.measure(own, plan, options.limit, report.OUT / "bench.log")
+    if own:
+        data = {"machine": about, "options": vars(options), "rows": list(map(asdict, rows)), "trees": list(map(asdict, trees))}
+        parts = [report.machine_text(about), table_of(rows)] + ([fitted_bvh.table_of(trees)] if trees else [])
+        report.publish("bench", data, "\n\n".join(parts), options.update_docs)
+    if len(own) < len(options.scenes):
+        kanamori_2008.run(options.scenes, about, options.repeats, options.limit, options.update_docs)
 
 
 def table_of(rows: Sequence[Row]) -> str:

@@ -24,11 +24,14 @@ class Variant:
         A processor path; empty leaves the choice to the method.
     threads
         How many may work on the CPU; 0 for one a core.
+    switches
+        Options of Depth Peeling by name, where they are not its own.
     """
 
     method: str
     simd: str = ""
     threads: int = 0
+    switches: tuple[tuple[str, bool], ...] = ()
 
     def variables(self) -> dict[str, str]:
         """The environment variables of the process that runs it."""

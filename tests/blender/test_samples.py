@@ -25,7 +25,7 @@ def read_balls(meniscus):
     return read
 
 
-@pytest.mark.parametrize("name", ["block", "scattered"])
+@pytest.mark.parametrize("name", ["block", "jets", "scattered"])
 def test_points_come_through_blender_as_they_are(sample, empty_scene, read_balls, name):
     expected = sample(name).balls(200, seed=2)
     sample(name).build(empty_scene, count=200, seed=2)
@@ -34,6 +34,21 @@ def test_points_come_through_blender_as_they_are(sample, empty_scene, read_balls
     assert np.array_equal(balls.radii, expected.radii)
     assert np.array_equal(balls.ids, expected.ids)
     assert empty_scene.camera is not None
+
+
+def test_a_molecule_brings_its_colours_and_its_isovalue(sample, empty_scene, read_balls):
+    molecule = sample("molecule")
+    molecule.build(empty_scene)
+    balls, expected = read_balls(), molecule.balls()
+    assert np.array_equal(balls.positions, expected.positions)
+    assert np.allclose(balls.colors, expected.colors)
+    assert empty_scene.meniscus.isovalue == pytest.approx(molecule.ISOVALUE)
+    assert share_in_view(empty_scene, balls.positions) == 1
+
+
+def test_the_camera_sees_all_jets(sample, empty_scene, read_balls):
+    sample("jets").build(empty_scene, count=2000)
+    assert share_in_view(empty_scene, read_balls().positions) > 0.99
 
 
 def test_argon_has_velocities_and_lies_in_front_of_the_camera(sample, empty_scene, read_balls, tmp_path, monkeypatch):

@@ -56,13 +56,22 @@ def _shares(balls, field, points):
     return balls.weights * KERNELS[field.kernel].value(1 - distance_2 / balls.radii.astype(np.float64) ** 2)
 
 
+def _met_by(balls, origin, direction):
+    """The balls whose influence spheres a line meets: no other has a share along it."""
+    to_centre = balls.positions.astype(np.float64) - origin
+    distance_2 = (to_centre**2).sum(-1) - (to_centre @ direction) ** 2
+    met = np.flatnonzero(distance_2 <= (1.001 * balls.radii) ** 2)
+    return meniscus.Balls(balls.positions[met], balls.radii[met], balls.weights[met])
+
+
 def is_undecidable(balls, field, want: Expected, index: int, camera: meniscus.Camera, t_image: float) -> bool:
     """Whether the density along the ray has an extremum within 1e-4 of the isovalue before the farther of the two hits."""
+    balls = _met_by(balls, want.origins[index], want.directions[index])
     far = max(np.nan_to_num(t_image, posinf=0), np.nan_to_num(want.t[index], posinf=0))
     start = camera.clip_start * want.stretch[index]
     if not (np.isfinite(t_image) and np.isfinite(want.t[index])):
         reach = np.linalg.norm(balls.positions - want.origins[index], axis=1) + balls.radii
-        far = float(np.max(reach))
+        far = float(np.max(reach, initial=start))
     t = np.linspace(start, far, 4001)
     for _ in range(3):
         density = _shares(balls, field, want.origins[index] + t[:, None] * want.directions[index]).sum(-1)
@@ -91,6 +100,8 @@ class Verdict:
         How many pixels differ where nothing can be decided.
     worst, rms
         |dt| / R, R of the ball that dominates at the hit.
+    relative_rms
+        |dt| / t, as Kanamori, Szego and Nishita 2008, section 6, measure it.
     worst_angle
         Between normals, degrees.
     """
@@ -100,36 +111,45 @@ class Verdict:
     undecidable: int
     worst: float
     rms: float
+    relative_rms: float
     worst_angle: float
 
 
-def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> Verdict:
-    """Compare every pixel of an image with the oracle."""
-    want = expected(scene.balls, scene.field, camera)
-    hit, should_hit = image.hit.ravel(), np.isfinite(want.t)
-    t = np.where(hit, image["depth"].ravel() * want.stretch, np.inf)
+def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera, pixels: np.ndarray | slice = slice(None)) -> Verdict:
+    """Compare every pixel of an image, or some, with the oracle."""
+    want = expected(scene.balls, scene.field, camera, pixels)
+    places = np.arange(camera.width * camera.height)[pixels]
+    hit, should_hit = image.hit.ravel()[pixels], np.isfinite(want.t)
+    t = np.where(hit, image["depth"].ravel()[pixels] * want.stretch, np.inf)
     both = hit & should_hit
     error = np.zeros(len(t))
     error[both] = np.abs(t[both] - want.t[both]) / want.radius[both]
     suspects = np.flatnonzero((hit != should_hit) | (error > 1e-3))
     undecidable = [index for index in suspects if is_undecidable(scene.balls, scene.field, want, index, camera, t[index])]
     wrong = [
-        f"{divmod(int(index), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, R = {want.radius[index]:.2g}"
+        f"{divmod(int(places[index]), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, "
+        f"R = {want.radius[index]:.2g}"
         for index in suspects
         if index not in undecidable
     ]
     both[undecidable] = False
-    cross = np.cross(image["normal"].reshape(-1, 3)[both].astype(np.float64), want.normals[both])
-    dot = np.einsum("ij,ij->i", image["normal"].reshape(-1, 3)[both].astype(np.float64), want.normals[both])
+    normals = image["normal"].reshape(-1, 3)[pixels][both].astype(np.float64)
+    cross = np.cross(normals, want.normals[both])
+    dot = np.einsum("ij,ij->i", normals, want.normals[both])
     angle = np.degrees(np.arctan2(np.linalg.norm(cross, axis=1), dot))
     return Verdict(
         compared=int(both.sum()),
         wrong=wrong,
         undecidable=len(undecidable),
         worst=float(error[both].max(initial=0.0)),
-        rms=float(np.sqrt(np.mean(error[both] ** 2))) if both.any() else 0.0,
+        rms=_rms(error[both]),
+        relative_rms=_rms(error[both] * want.radius[both] / want.t[both]),
         worst_angle=float(angle.max(initial=0.0)),
     )
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def judge(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> None:

@@ -6,8 +6,9 @@ import sys
 import numpy as np
 import pytest
 
+import meniscus
 from meniscus.addon.fluid.errors import InputError, OutputError
-from meniscus.samples import argon, block, lennard_jones, scattered, shell, store
+from meniscus.samples import argon, block, jets, lennard_jones, molecule, peptide, scattered, shell, store
 
 
 def distances_to_all(positions, box=np.inf):
@@ -23,7 +24,7 @@ def empty_store(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("sample", [block, scattered])
+@pytest.mark.parametrize("sample", [block, jets, scattered])
 def test_the_same_seed_gives_the_same_balls_and_another_seed_others(sample):
     first, again, other = sample.balls(500, seed=3), sample.balls(500, seed=3), sample.balls(500, seed=4)
     assert np.array_equal(first.positions, again.positions)
@@ -31,7 +32,7 @@ def test_the_same_seed_gives_the_same_balls_and_another_seed_others(sample):
     assert not np.array_equal(first.positions, other.positions)
 
 
-@pytest.mark.parametrize("sample", [block, scattered])
+@pytest.mark.parametrize("sample", [block, jets, scattered])
 @pytest.mark.parametrize("count", [1, 27, 28, 1000, 12345])
 def test_a_sample_has_as_many_balls_as_were_asked_for(sample, count):
     balls = sample.balls(count)
@@ -67,6 +68,88 @@ def test_scattered_balls_fill_the_cube_and_the_range_of_radii():
     assert np.allclose(balls.positions.mean(axis=0), 0, atol=0.05)
     spacing = scattered.SIDE / 4000 ** (1 / 3)
     assert np.quantile(balls.radii / spacing, [0, 0.5, 1]) == pytest.approx([0.4, 0.8, 1.2], abs=0.02)
+
+
+def test_particles_of_the_jets_are_born_and_stay_from_the_full_frame_on():
+    counts = [len(jets.balls(3000, frame=frame)) for frame in (1, 10, 20, jets.FULL_FRAME, 3 * jets.FULL_FRAME)]
+    assert counts[0] == 0
+    assert 0 < counts[1] < counts[2] < 3000
+    assert counts[3:] == [3000, 3000]
+
+
+def test_particles_of_the_jets_fly_along_parabolas():
+    before, after = (jets.balls(5000, frame=frame) for frame in (70, 71))
+    step = 1 / jets.FRAMES_PER_SECOND
+    # All but those that hit the basin in between: they have not been slowed down by gravity alone.
+    flew = np.isclose(after.velocities[:, 2], before.velocities[:, 2] - jets.GRAVITY * step, atol=1e-4)
+    assert flew.mean() > 0.9
+    mean = (before.velocities + after.velocities)[flew].astype(np.float64) / 2
+    assert np.allclose(after.positions[flew], before.positions[flew] + mean * step, atol=1e-5)
+    assert before.positions[:, 2].min() > -1e-6
+    assert before.positions[:, 2].max() == pytest.approx(6.2**2 / (2 * jets.GRAVITY), rel=0.15)
+
+
+def test_an_alpha_helix_has_its_pitch_its_hydrogen_bonds_and_turns_right():
+    n, ca, c, o, cb = peptide.helix(20).swapaxes(0, 1)
+    turn = np.unwrap(np.arctan2(ca[:, 1], ca[:, 0]))
+    assert np.degrees(np.diff(turn)) == pytest.approx(100, abs=1)
+    assert np.diff(ca[:, 2]) == pytest.approx(1.5, abs=0.1)
+    assert np.linalg.norm(ca[:, :2], axis=1) == pytest.approx(2.3, abs=0.05)
+    assert np.linalg.norm(n[1:] - c[:-1], axis=1) == pytest.approx(1.329)
+    # From each oxygen to the nitrogen four residues on.
+    assert np.linalg.norm(o[:-4] - n[4:], axis=1) == pytest.approx(2.9, abs=0.25)
+    # Amino acids of life are left-handed.
+    assert np.all(np.einsum("ij,ij->i", np.cross(n - ca, c - ca), cb - ca) > 0)
+
+
+@pytest.mark.parametrize("residue", peptide.SIDE_CHAINS)
+def test_all_rotamers_of_a_residue_have_its_bonds(residue):
+    backbone = peptide.helix(4)[1]
+    rotamers = peptide.side_chains(residue, backbone)
+    bonds = peptide.SIDE_CHAINS[residue]
+    assert rotamers.shape == (9, len(bonds), 3)
+    names = [*peptide.BACKBONE, *(bond.atom for bond in bonds)]
+    atoms = np.concatenate([np.broadcast_to(backbone, (9, 5, 3)), rotamers], axis=1)
+    for bond in bonds:
+        length = np.linalg.norm(atoms[:, names.index(bond.atom)] - atoms[:, names.index(bond.along[2])], axis=1)
+        assert length == pytest.approx(bond.length)
+    # Nothing but what is bonded is near, and a ring's two ends meet.
+    apart = np.stack([distances_to_all(positions) for positions in atoms])
+    assert apart[:, ~np.eye(len(names), dtype=bool)].min(initial=9) > 1.2
+    if residue in ("PHE", "TYR"):
+        assert apart[:, names.index("CZ"), names.index("CE2")] == pytest.approx(1.38, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_molecule_has_its_atoms_bonds_and_elements(seed):
+    protein = molecule.protein(seed)
+    assert len(protein.positions) == molecule.ATOMS == 2878
+    assert len(np.unique(protein.residues)) == molecule.HELICES * molecule.RESIDUES
+    distances = distances_to_all(protein.positions)
+    np.fill_diagonal(distances, np.inf)
+    # A bond or more for each atom, and few places where side chains are too near each other.
+    assert distances.min(axis=1).max() < 1.85
+    strangers = np.abs(protein.residues[:, None] - protein.residues) > 1
+    assert np.count_nonzero(distances[strangers] < 2.5) / 2 < 0.02 * molecule.ATOMS
+    shares = {element: np.mean(protein.elements == element) for element in "CNOS"}
+    assert shares["C"] == pytest.approx(0.65, abs=0.05)
+    assert 0 < shares["S"] < 0.02
+
+
+def test_atoms_are_as_large_and_coloured_as_their_elements():
+    balls, protein = molecule.balls(), molecule.protein()
+    assert len(balls) == molecule.ATOMS
+    for element, radius in molecule.RADII.items():
+        is_element = protein.elements == element
+        assert np.allclose(balls.radii[is_element], molecule.RADIUS * radius * molecule.UNIT)
+        assert np.allclose(balls.colors[is_element], molecule.COLORS[element])
+    # Where two carbons are bonded the surface is one piece, and would not be for spheres.
+    field = meniscus.Field("wyvill", molecule.ISOVALUE)
+    pair = meniscus.Balls([[0, 0, 0], [1.53 * molecule.UNIT, 0, 0]], molecule.RADIUS * 1.7 * molecule.UNIT)
+    assert 2 * field.kernel_radii(pair.radii, pair.weights)[0] < 1.53 * molecule.UNIT
+    half_way = np.array([[1.53 / 2 * molecule.UNIT, -1.0, 0.0]])
+    t, _ = meniscus.oracle.cast(pair, field, half_way, np.array([[0.0, 1.0, 0.0]]))
+    assert np.isfinite(t[0])
 
 
 def test_the_cell_list_finds_the_pairs_that_comparing_all_atoms_finds():

@@ -1,0 +1,24 @@
+"""The experiments of Kanamori, Szego and Nishita 2008: every method against the oracle."""
+
+from __future__ import annotations
+
+import pytest
+from paper_scenes import NAMES, PIXELS, compare_picture
+
+from meniscus.addon.render.registry import method_infos
+
+METHODS = [info.name for info in method_infos()]
+RELATIVE_RMS = 1e-5
+"""Of t; the paper, section 6, reports 7e-3."""
+SMALL = ("kanamori_figure_1", "kanamori_figure_2", "kanamori_figure_11")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in SMALL else [pytest.mark.slow]) for name in NAMES])
+@pytest.mark.parametrize("method", METHODS)
+def test_the_papers_pictures_match_the_oracle(method, name):
+    verdict = compare_picture(method, name)
+    assert verdict.compared > 0.1 * PIXELS, "the picture should show something"
+    assert not verdict.wrong, f"{len(verdict.wrong)} wrong pixels of {PIXELS}: {verdict.wrong[:5]}"
+    assert verdict.undecidable <= 0.002 * PIXELS
+    assert verdict.relative_rms <= RELATIVE_RMS
+    assert verdict.worst_angle <= 0.5
