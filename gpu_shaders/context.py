@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import platform
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 from typing import Any, TypeVar
@@ -80,6 +80,8 @@ class GpuContext:
         self.limits = Limits.from_info(self.gl.info)
         self._driver = DriverState(self.gl, self.function)
         self._debug_output = DebugOutput(self.gl, self.function)
+        self._use_program = self.function("glUseProgram", ctypes.c_uint)
+        self._uniform_1i = self.function("glUniform1i", ctypes.c_int, ctypes.c_int)
         self._bind_texture = self.function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
         self._tex_image_2d = self.function("glTexImage2D", *[ctypes.c_uint] * 8, ctypes.c_void_p)
 
@@ -171,6 +173,14 @@ class GpuContext:
                     f"another driver: {source.explain(str(error))}"
                 ) from error
         return self._programs[source]
+
+    def set_sampler_units(self, program: moderngl.Program, units: Mapping[str, int]) -> None:
+        """Say which texture unit each sampler reads; moderngl does not know samplers of buffer textures."""
+        self._use_program(program.glo)
+        for name, unit in units.items():
+            sampler = program[name]
+            assert isinstance(sampler, moderngl.Uniform)
+            self._uniform_1i(sampler.location, unit)
 
     def depth_texture(self, size: tuple[int, int]) -> moderngl.Texture:
         """A depth texture of 32-bit floats to sample plainly; moderngl's own have 24 bits, too few to order crossings."""

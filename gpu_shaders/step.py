@@ -6,8 +6,11 @@ from collections.abc import Mapping
 
 import moderngl
 
+from .buffer_texture import BufferTexture
 from .context import GpuContext
 from .programs import ProgramSource
+
+Texture = moderngl.Texture | BufferTexture
 
 
 class Step:
@@ -22,9 +25,11 @@ class Step:
     def __init__(self, context: GpuContext, source: ProgramSource) -> None:
         self._gl = context.gl
         self._program = context.program(source)
-        self._without_buffers = self._gl.vertex_array(self._program, [])
-        self._on_buffers: dict[tuple[moderngl.Buffer, str, str], moderngl.VertexArray] = {}
-        self.textures: dict[str, moderngl.Texture] = {}
+        self._array = self._gl.vertex_array(self._program, [])
+        names = [name for name in self._program if name.endswith("_tx")]
+        self._units = {name: unit for unit, name in enumerate(names)}
+        context.set_sampler_units(self._program, self._units)
+        self.textures: dict[str, Texture] = {}
 
     def set_uniforms(self, values: Mapping[str, object]) -> None:
         """Set those of `values` that the program uses."""
@@ -32,18 +37,17 @@ class Step:
             if name in self._program:
                 self._program[name] = value
 
-    def use_textures(self, textures: Mapping[str, moderngl.Texture]) -> None:
-        """Bind `textures` and the step's own, as far as the program reads them."""
-        used = [name for name in {**self.textures, **textures} if name in self._program]
-        for unit, name in enumerate(used):
+    def use_textures(self, textures: Mapping[str, Texture]) -> None:
+        """Bind what the program reads of `textures` and its own."""
+        for name, unit in self._units.items():
             (textures.get(name) or self.textures[name]).use(unit)
-            self._program[name] = unit
 
-    def vertex_array(self, buffer: moderngl.Buffer | None = None, layout: str = "", name: str = "") -> moderngl.VertexArray:
-        """The program's inputs: none, or `name` from a buffer with the layout that moderngl calls so."""
-        if buffer is None:
-            return self._without_buffers
-        key = (buffer, layout, name)
-        if key not in self._on_buffers:
-            self._on_buffers[key] = self._gl.vertex_array(self._program, [(buffer, layout, name)])
-        return self._on_buffers[key]
+    def vertex_array(self, *inputs: tuple[moderngl.Buffer, str, str]) -> moderngl.VertexArray:
+        """The program with vertices that come from buffers, or from nowhere."""
+        return self._gl.vertex_array(self._program, list(inputs)) if inputs else self._array
+
+    def draw(self, framebuffer: moderngl.Framebuffer, mode: int, vertices: int, textures: Mapping[str, Texture]) -> None:
+        """Draw vertices that come from nowhere."""
+        self.use_textures(textures)
+        framebuffer.use()
+        self._array.render(mode, vertices)

@@ -12,8 +12,11 @@ from scenes import SCENES, Scene
 import meniscus
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
-from meniscus.gpu_shaders.methods.depth_peeling import frame, groups
+from meniscus.gpu_shaders.capture import Capture
+from meniscus.gpu_shaders.methods.depth_peeling import groups, targets
 from meniscus.gpu_shaders.methods.depth_peeling.options import Options
+from meniscus.gpu_shaders.occlusion import OcclusionQuery
+from meniscus.gpu_shaders.step import Step
 
 SWITCHES = [field.name for field in fields(Options) if field.default is True]
 # Deep lists, large and small balls, hidden ones, rays that start inside, carving.
@@ -81,7 +84,7 @@ def test_rays_whose_lists_are_too_short_arrive_all_the_same(scene_name, kernel, 
 
 
 def test_pairs_that_do_not_fit_make_their_buffer_grow(depth_peeling, monkeypatch):
-    monkeypatch.setattr(frame, "_PAIRS_A_BALL", 1)
+    monkeypatch.setattr(targets, "FIRST_PAIRS", 1)
     scene = SCENES["ten_balls"]()
     camera = scene.camera("perspective")
     image = depth_peeling(scene, camera)
@@ -105,6 +108,37 @@ def test_too_few_render_targets_are_an_error(depth_peeling, pretend_limits):
     pretend_limits(draw_buffers=3)
     with pytest.raises(DeviceError, match="4 render targets at once are needed"):
         depth_peeling(scene, scene.camera("perspective"))
+
+
+def test_more_pairs_than_a_buffer_takes_are_an_error(depth_peeling, monkeypatch, pretend_limits):
+    monkeypatch.setattr(targets, "FIRST_PAIRS", 1)
+    pretend_limits(texture_buffer_size=10)
+    scene = SCENES["ten_balls"]()
+    with pytest.raises(DeviceError, match="parts of balls are in the view but .* takes at most 10"):
+        depth_peeling(scene, scene.camera("perspective"))
+
+
+def test_calls_of_opengl_grow_neither_with_balls_nor_with_pixels(depth_peeling, monkeypatch):
+    called = []
+
+    def count_calls(owner, name):
+        function = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda *arguments: (called.append(name), function(*arguments))[1])
+
+    for owner, name in ((Step, "draw"), (Capture, "points"), (OcclusionQuery, "asked")):
+        count_calls(owner, name)
+
+    def calls(count, width):
+        """The balls lie in one plane, so that there are as many passes whatever their number."""
+        called.clear()
+        side = round(count**0.5)
+        x, z = np.unravel_index(np.arange(side**2), (side, side))
+        positions = np.stack([x, np.zeros_like(x), z], axis=1) / side - 0.5
+        scene = Scene(meniscus.Balls(positions, 0.8 / side), view_height=1.2)
+        depth_peeling(scene, replace(scene.camera("orthographic"), width=width, height=width))
+        return len(called)
+
+    assert calls(40_000, 512) <= calls(100, 64) + groups.MAX_GROUPS + 20
 
 
 def many_balls_on_one_pixel(weight: float, count: int) -> Scene:

@@ -10,25 +10,23 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from ...buffer_texture import BufferTexture
 from ...capture import Capture, Range
 from ...context import GpuContext
 from ...occlusion import OcclusionQueries, OcclusionQuery
-from ...step import Step
+from ...step import Step, Texture
 from .programs import LIST_TARGETS, Phase, Variant
 from .targets import Targets
 
-PASSES_A_BATCH = 2
-"""Passes between two looks at what is left."""
-_PAIR_BYTES = 8
-_PAIRS_A_BALL = 3
-"""To begin with; the buffers grow where it is not enough."""
+FIRST_BATCH, LARGEST_BATCH = 2, 4
+"""Passes between two looks at what is left: most pixels are done after a few, the others take long."""
 
 
 @dataclass(frozen=True)
 class Pairs:
     """Pairs of a ball and a cell, in the order of the balls."""
 
-    buffer: moderngl.Buffer
+    texture: BufferTexture
     count: int
 
 
@@ -65,7 +63,6 @@ class Frame:
         self._occlusion_queries = OcclusionQueries(context)
         self._capture = Capture(context)
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
-        self._pair_buffers = [self._pair_buffer(_PAIRS_A_BALL * ball_count) for _ in range(3)]
         self._cells = targets.cells
 
     def bind(self, textures: dict[str, moderngl.Texture], uniforms: dict[str, object]) -> None:
@@ -130,14 +127,14 @@ class Frame:
             (int(first), int(end - first), query) for first, end, query in zip(starts[:-1], starts[1:], queries, strict=True)
         ]
         step = self._steps["bin"]
-        return self._captured(0, step, step.vertex_array(), ranges)
+        return self._captured(self._targets.pairs[0], step, ranges)
 
     def _query_groups(self, corners: npt.NDArray[np.float32]) -> list[OcclusionQuery]:
         """An occlusion query for each group, against the kernel spheres."""
         framebuffer = self._targets.peel[self._now]
         framebuffer.color_mask, framebuffer.depth_mask = (False,) * 4, False
         step = self._steps["group"]
-        array = step.vertex_array(self._gl.buffer(corners), "3f", "in_corner")
+        array = step.vertex_array((self._gl.buffer(corners), "3f", "in_corner"))
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
         framebuffer.use()
@@ -151,21 +148,18 @@ class Frame:
     def _keep(self, pairs: Pairs, phase: Phase) -> Pairs:
         """Those of the pairs whose cells still ask for them."""
         step = self._steps[f"keep_{phase.name.lower()}"]
-        slot = 2 if pairs.buffer is self._pair_buffers[1] else 1
-        array = step.vertex_array(pairs.buffer, "2u4", "in_pair")
-        return self._captured(slot, step, array, [(0, pairs.count, None)])
+        buffers = self._targets.pairs
+        output = buffers[2] if pairs.texture is buffers[1] else buffers[1]
+        return self._captured(output, step, [(0, pairs.count, None)], pairs_tx=pairs.texture)
 
-    def _captured(self, slot: int, step: Step, array: moderngl.VertexArray, ranges: Sequence[Range]) -> Pairs:
-        """What a step emits, in a pair buffer; once more where the buffer was too small."""
-        step.use_textures(self._cells.textures)
-        count = self._capture.points(array, ranges, self._pair_buffers[slot])
-        if count * _PAIR_BYTES > self._pair_buffers[slot].size:
-            self._pair_buffers[slot] = self._pair_buffer(count)
-            count = self._capture.points(array, ranges, self._pair_buffers[slot])
-        return Pairs(self._pair_buffers[slot], count)
-
-    def _pair_buffer(self, count: int) -> moderngl.Buffer:
-        return self._gl.buffer(reserve=_PAIR_BYTES * count, dynamic=True)
+    def _captured(self, output: BufferTexture, step: Step, ranges: Sequence[Range], **textures: Texture) -> Pairs:
+        """What a step emits from ranges of points; once more where the buffer was too small."""
+        step.use_textures({**textures, **self._cells.textures})
+        count = self._capture.points(step.vertex_array(), ranges, output.buffer)
+        if count > output.capacity:
+            output.reserve(count)
+            count = self._capture.points(step.vertex_array(), ranges, output.buffer)
+        return Pairs(output, count)
 
     def _measure_cells(self, phase: Phase) -> None:
         """What the cells of the image ask for now."""
@@ -215,8 +209,9 @@ class Frame:
         """
         passes = 0
         previous: OcclusionQuery | None = None
-        queries = self._occlusion_queries.take(PASSES_A_BATCH)
+        batch = FIRST_BATCH
         while True:
+            queries = self._occlusion_queries.take(batch)
             self._check_cancelled()
             before = self._now
             for query in queries:
@@ -231,6 +226,7 @@ class Frame:
             passes += done
             if not all(drawn):
                 return passes
+            batch = min(2 * batch, LARGEST_BATCH)
             self._measure_cells(phase)
             pairs = self._keep(pairs, phase)
 
@@ -253,7 +249,7 @@ class Frame:
 
     def _diagnostics(self, pairs: Pairs) -> dict[str, int]:
         """Counts that cost time."""
-        words = np.frombuffer(pairs.buffer.read(_PAIR_BYTES * pairs.count), np.uint32).reshape(-1, 2)
+        words = np.frombuffer(pairs.texture.buffer.read(8 * pairs.count), np.uint32).reshape(-1, 2)
         width, height = self._targets.size
         iterations = np.frombuffer(self._targets.iterations[self._now].read(), np.uint32).reshape(height, width, 4)
         return {
@@ -268,55 +264,31 @@ class Frame:
         self._gl.blend_equation = color, color if alpha is None else alpha
         self._gl.blend_func = moderngl.ONE, moderngl.ONE
 
-    def _over_screen(self, name: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
+    def _over_screen(self, name: str, framebuffer: moderngl.Framebuffer, **textures: Texture) -> None:
         """Draw every pixel once; a depth buffer is written, never asked."""
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "1"
-        self._render(name, framebuffer, textures, None, 1, moderngl.TRIANGLES, 3)
+        self._steps[name].draw(framebuffer, moderngl.TRIANGLES, 3, textures)
 
-    def _over_tiles(self, name: str, framebuffer: moderngl.Framebuffer, **textures: moderngl.Texture) -> None:
+    def _over_tiles(self, name: str, framebuffer: moderngl.Framebuffer, **textures: Texture) -> None:
         """Draw the pixels of the fine cells that ask for something; a depth buffer is written, never asked."""
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "1"
-        self._render(name, framebuffer, {**textures, **self._cells.textures}, None, self._cells.across * self._cells.down)
+        count = self._cells.across * self._cells.down
+        self._steps[name].draw(framebuffer, moderngl.TRIANGLES, 6 * count, {**textures, **self._cells.textures})
 
-    def _over_balls(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, **textures: moderngl.Texture) -> None:
+    def _over_balls(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, **textures: Texture) -> None:
         """Draw the rectangle of every ball."""
-        self._draw_spheres(name, framebuffer, flags, textures, None, self._ball_count)
+        self._draw_spheres(name, framebuffer, flags, textures, self._ball_count)
 
-    def _over_pairs(
-        self, name: str, framebuffer: moderngl.Framebuffer, flags: int, pairs: Pairs, **textures: moderngl.Texture
-    ) -> None:
+    def _over_pairs(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, pairs: Pairs, **textures: Texture) -> None:
         """Draw the part of each pair's ball in its cell."""
-        self._draw_spheres(name, framebuffer, flags, textures, pairs.buffer, pairs.count)
+        self._draw_spheres(name, framebuffer, flags, {**textures, "pairs_tx": pairs.texture}, pairs.count)
 
     def _draw_spheres(
-        self,
-        name: str,
-        framebuffer: moderngl.Framebuffer,
-        flags: int,
-        textures: dict[str, moderngl.Texture],
-        pairs: moderngl.Buffer | None,
-        count: int,
+        self, name: str, framebuffer: moderngl.Framebuffer, flags: int, textures: dict[str, Texture], count: int
     ) -> None:
         self._gl.enable_only(flags)
         self._gl.depth_func = "<"
-        self._render(name, framebuffer, textures, pairs, count)
-
-    def _render(
-        self,
-        name: str,
-        framebuffer: moderngl.Framebuffer,
-        textures: dict[str, moderngl.Texture],
-        pairs: moderngl.Buffer | None,
-        instances: int,
-        mode: int = moderngl.TRIANGLE_STRIP,
-        vertices: int = 4,
-    ) -> None:
-        if not instances:
-            return
-        step = self._steps[name]
-        step.use_textures(textures)
-        framebuffer.use()
-        array = step.vertex_array() if pairs is None else step.vertex_array(pairs, "2u4 /i", "in_pair")
-        array.render(mode, vertices, instances=instances)
+        if count:
+            self._steps[name].draw(framebuffer, moderngl.TRIANGLES, 6 * count, textures)

@@ -3,7 +3,7 @@
 #include "methods/depth_peeling/state.glsl"
 #include "methods/depth_peeling/cells.glsl"
 
-in uvec2 in_pair;
+uniform usamplerBuffer pairs_tx;
 
 flat out uvec2 v_pair;
 flat out int v_is_kept;
@@ -22,8 +22,8 @@ float farthest(Ball ball) {
 }
 
 void main() {
-    v_pair = in_pair;
-    Ball ball = ball_fetch(in_pair.x);
+    v_pair = texelFetch(pairs_tx, gl_VertexID).xy;
+    Ball ball = ball_fetch(v_pair.x);
     float nearest = sphere_nearest(ball.center, ball.radius) * depth_scale;
-    v_is_kept = int(cell_wants(cell_level(in_pair.y), cell_position(in_pair.y), nearest, farthest(ball)));
+    v_is_kept = int(cell_wants(cell_level(v_pair.y), cell_position(v_pair.y), nearest, farthest(ball)));
 }

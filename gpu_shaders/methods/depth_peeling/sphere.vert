@@ -1,11 +1,12 @@
-// Two triangles around each sphere, as a strip. With FROM_PAIRS one instance for each pair of a ball and a cell: the part of
-// the ball's rectangle in that cell. Else one instance for each ball.
+// Two triangles around each sphere. With FROM_PAIRS for each pair of a ball and a cell: the part of the ball's rectangle in that
+// cell. Else for each ball. Six vertices each: drivers do badly with instances of so few.
 #include "lib/sphere_bounds.glsl"
+#include "lib/triangles.glsl"
 #include "methods/depth_peeling/state.glsl"
 #if FROM_PAIRS
 #include "methods/depth_peeling/cells.glsl"
 
-in uvec2 in_pair; // ball, cell
+uniform usamplerBuffer pairs_tx; // ball, cell
 #endif
 
 flat out uint v_id;
@@ -28,10 +29,12 @@ bool is_drawn(Ball ball, vec2 density) {
 }
 
 void main() {
+    int index = gl_VertexID / 6;
 #if FROM_PAIRS
-    v_id = in_pair.x;
+    uvec2 pair = texelFetch(pairs_tx, index).xy;
+    v_id = pair.x;
 #else
-    v_id = uint(gl_InstanceID);
+    v_id = uint(index);
 #endif
     Ball ball = ball_fetch(v_id);
     v_density = ball_density(v_id);
@@ -43,12 +46,12 @@ void main() {
 #endif
     vec4 rectangle = sphere_rectangle(ball.center, radius);
 #if FROM_PAIRS
-    uint level = cell_level(in_pair.y);
-    vec2 cell = vec2(cell_position(in_pair.y)) * cell_size(level);
+    uint level = cell_level(pair.y);
+    vec2 cell = vec2(cell_position(pair.y)) * cell_size(level);
     rectangle = vec4(max(rectangle.xy, cell), min(rectangle.zw, cell + cell_size(level)));
 #endif
     // Where nothing is to be drawn all corners fall together.
-    vec2 corner = is_drawn(ball, v_density) ? vec2(gl_VertexID & 1, gl_VertexID >> 1) : vec2(0.0);
+    vec2 corner = is_drawn(ball, v_density) ? square_corner(gl_VertexID % 6) : vec2(0.0);
     vec2 position = mix(rectangle.xy, max(rectangle.zw, rectangle.xy), corner) / image_middle - 1.0;
     // A little nearer than any crossing: fragments may be dropped early by this depth.
     float depth = clamp(sphere_nearest(ball.center, radius) * depth_scale, 0.0, 1.0);

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import moderngl
 
+from ...buffer_texture import BufferTexture
 from ...context import GpuContext
 from .programs import CELL_FACTOR, CELL_SIZE, LIST_TARGETS
+
+FIRST_PAIRS = 2**16
+"""Room for pairs to begin with; it grows."""
 
 
 class Targets:
@@ -43,6 +47,8 @@ class Targets:
         self.gather = gl.framebuffer(self.sums)
         self.finish = gl.framebuffer(self.outputs)
         self.cells = CellTargets(gl, size)
+        # The first pairs, and two for those that are left of them.
+        self.pairs = [BufferTexture(context, FIRST_PAIRS) for _ in range(3)]
 
 
 class CellTargets:
