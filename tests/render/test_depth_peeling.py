@@ -114,7 +114,7 @@ def test_more_pairs_than_a_buffer_takes_are_an_error(depth_peeling, monkeypatch,
     monkeypatch.setattr(targets, "FIRST_PAIRS", 1)
     pretend_limits(texture_buffer_size=10)
     scene = SCENES["ten_balls"]()
-    with pytest.raises(DeviceError, match="parts of balls are in the view but .* takes at most 10"):
+    with pytest.raises(DeviceError, match="parts of balls are in the view"):
         depth_peeling(scene, scene.camera("perspective"))
 
 
