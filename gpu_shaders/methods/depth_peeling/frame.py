@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ...buffer_texture import BufferTexture
-from ...capture import Capture, Range
+from ...capture import Range
 from ...context import GpuContext
-from ...occlusion import OcclusionQueries, OcclusionQuery
+from ...occlusion import OcclusionQuery
 from ...step import Step, Texture
 from .programs import LIST_TARGETS, Phase, Variant
-from .targets import Targets
+from .targets import Workspace
 
 FIRST_BATCH, LARGEST_BATCH = 2, 4
 """Passes between two looks at what is left: most pixels are done after a few, the others take long."""
@@ -35,8 +35,10 @@ class Frame:
 
     Parameters
     ----------
-    context, targets
+    context, workspace
         Where to draw.
+    size
+        Width and height, pixels.
     variant
         What the programs depend on.
     ball_count
@@ -48,22 +50,22 @@ class Frame:
     def __init__(
         self,
         context: GpuContext,
-        targets: Targets,
+        workspace: Workspace,
+        size: tuple[int, int],
         variant: Variant,
         ball_count: int,
         check_cancelled: Callable[[], None],
     ) -> None:
         self._gl = context.gl
-        self._targets = targets
+        self._workspace = workspace
+        self._targets = workspace.targets(size, variant.options.diagnostics)
         self._variant = variant
         self._ball_count = ball_count
         self._check_cancelled = check_cancelled
         # Which of each pair of targets holds the present state.
         self._now = 0
-        self._occlusion_queries = OcclusionQueries(context)
-        self._capture = Capture(context)
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
-        self._cells = targets.cells
+        self._cells = self._targets.cells
 
     def bind(self, textures: dict[str, moderngl.Texture], uniforms: dict[str, object]) -> None:
         """Give every step the balls and the camera."""
@@ -86,11 +88,11 @@ class Frame:
         self._measure_cells(Phase.PEELING)
         pairs = self._bin(group_starts, group_corners)
         counts = {"pairs": pairs.count, "peels": self._peel(pairs)}
+        if self._variant.options.diagnostics:
+            counts.update(self._diagnostics(pairs))
         counts["overflows"] = self._count_walkers()
         counts["walks"] = self._walk(pairs) if counts["overflows"] else 0
         self._gather(pairs)
-        if self._variant.options.diagnostics:
-            counts.update(self._diagnostics(pairs))
         return counts
 
     def read(self, output: int) -> npt.NDArray[np.float32]:
@@ -127,7 +129,7 @@ class Frame:
             (int(first), int(end - first), query) for first, end, query in zip(starts[:-1], starts[1:], queries, strict=True)
         ]
         step = self._steps["bin"]
-        return self._captured(self._targets.pairs[0], step, ranges)
+        return self._captured(self._workspace.pairs[0], step, ranges)
 
     def _query_groups(self, corners: npt.NDArray[np.float32]) -> list[OcclusionQuery]:
         """An occlusion query for each group, against the kernel spheres."""
@@ -138,7 +140,7 @@ class Frame:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
         framebuffer.use()
-        queries = self._occlusion_queries.take(len(corners))
+        queries = self._workspace.queries.take(len(corners))
         for group, query in enumerate(queries):
             with query.asked():
                 array.render(moderngl.TRIANGLE_STRIP, 4, first=4 * group)
@@ -148,17 +150,17 @@ class Frame:
     def _keep(self, pairs: Pairs, phase: Phase) -> Pairs:
         """Those of the pairs whose cells still ask for them."""
         step = self._steps[f"keep_{phase.name.lower()}"]
-        buffers = self._targets.pairs
+        buffers = self._workspace.pairs
         output = buffers[2] if pairs.texture is buffers[1] else buffers[1]
         return self._captured(output, step, [(0, pairs.count, None)], pairs_tx=pairs.texture)
 
     def _captured(self, output: BufferTexture, step: Step, ranges: Sequence[Range], **textures: Texture) -> Pairs:
         """What a step emits from ranges of points; once more where the buffer was too small."""
         step.use_textures({**textures, **self._cells.textures})
-        count = self._capture.points(step.vertex_array(), ranges, output.buffer)
+        count = self._workspace.capture.points(step.vertex_array(), ranges, output.buffer)
         if count > output.capacity:
             output.reserve(count)
-            count = self._capture.points(step.vertex_array(), ranges, output.buffer)
+            count = self._workspace.capture.points(step.vertex_array(), ranges, output.buffer)
         return Pairs(output, count)
 
     def _measure_cells(self, phase: Phase) -> None:
@@ -211,7 +213,7 @@ class Frame:
         previous: OcclusionQuery | None = None
         batch = FIRST_BATCH
         while True:
-            queries = self._occlusion_queries.take(batch)
+            queries = self._workspace.queries.take(batch)
             self._check_cancelled()
             before = self._now
             for query in queries:
@@ -234,7 +236,8 @@ class Frame:
         """How many rays had lists that were too short."""
         query = self._gl.query(samples=True)
         with query:
-            self._over_screen("count_walkers", self._targets.state_only[1 - self._now], state_tx=self._state())
+            # Anything without colours will do.
+            self._over_screen("count_walkers", self._targets.kernel, state_tx=self._state())
         return int(query.samples)
 
     def _gather(self, pairs: Pairs) -> None:

@@ -20,7 +20,7 @@ from .groups import Groups, ball_groups
 from .options import Options
 from .params import MAX_BALLS, METHOD
 from .programs import LIST_LENGTH, LIST_TARGETS, Variant
-from .targets import Targets
+from .targets import Workspace
 
 # An image of this many pixels takes some 250 MB; a larger one is drawn in parts.
 _PIXELS_A_PART = 2**20
@@ -44,7 +44,7 @@ class DepthPeeling:
         context.require(METHOD.gl_version, LIST_TARGETS + self._options.diagnostics)
         self._context = context
         self._list_length = list_length
-        self._targets: Targets | None = None
+        self._workspace: Workspace | None = None
 
     @property
     def device(self) -> str:
@@ -89,12 +89,13 @@ class DepthPeeling:
             with_colors=surface.color is not None,
             with_starts=distances.with_starts,
         )
+        self._workspace = workspace = self._workspace or Workspace(self._context)
         textures = ball_textures(self._context.gl, balls, variant.with_colors)
         starts = np.array([0, len(balls)]) if groups is None else groups.starts
         for region in _parts(camera, min(self._context.limits.texture_size, self._context.limits.viewport_size)):
             part = replace(camera, region=region).cropped()
             check_cancelled = partial(request.watch, region.y_min / camera.height)
-            frame = Frame(self._context, self._targets_for(part), variant, len(balls), check_cancelled)
+            frame = Frame(self._context, workspace, (part.width, part.height), variant, len(balls), check_cancelled)
             frame.bind(textures, frame_uniforms(balls, distances, part, field))
             corners = None if groups is None else groups.corners(part, distances.depth_scale)
             counts = frame.draw(starts, corners)
@@ -106,13 +107,6 @@ class DepthPeeling:
                 surface.color[rows, columns] = frame.read(1)[..., :3]
             for name, count in counts.items():
                 surface.counts[name] = surface.counts.get(name, 0) + count
-
-    def _targets_for(self, camera: Camera) -> Targets:
-        """The render targets of the camera's size, kept from part to part and frame to frame."""
-        size = (camera.width, camera.height)
-        if self._targets is None or self._targets.size != size:
-            self._targets = Targets(self._context, size, self._options.diagnostics)
-        return self._targets
 
 
 def create() -> DepthPeeling:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
 
@@ -55,46 +55,62 @@ class Variant:
 
     def programs(self) -> dict[str, ProgramSource]:
         """The programs by name."""
-        options = self.options
-        kernel = kernel_constants(self.kernel)
-        balls = {"BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH, "TIGHT_RECTANGLES": int(options.tight_rectangles)}
-        cells = {"CELL_SIZE": CELL_SIZE, "CELL_FACTOR": CELL_FACTOR, "BALL_CULLING": int(options.ball_culling)}
-        pairs = {**balls, **cells, "FROM_PAIRS": 1, "KERNEL_SPHERES": 0, "STARTS_ONLY": 0}
-        all_balls = {**balls, "FROM_PAIRS": 0, "KERNEL_SPHERES": 0, "STARTS_ONLY": 0}
-        begin = {"KERNEL_SPHERES": int(options.kernel_spheres), "WITH_STARTS": int(self.with_starts)}
-        stack = BEZIER_STACK if options.short_stack else 0
-        search = {
-            **kernel,
-            "LIST_LENGTH": self.list_length,
-            "BEZIER_STACK": stack,
-            "DIAGNOSTICS": int(options.diagnostics),
-        }
-        sources = [
-            _program("kernel", "sphere", "kernel", **{**all_balls, "KERNEL_SPHERES": 1}),
-            _program("begin", "screen", "begin", **begin),
-            _program("group", "group", "group"),
-            _captured("bin", **balls, **cells, TILING=int(options.tiling)),
-            _program("peel", "sphere", "peel", **pairs),
-            _program("search", "tile", "search", **balls, **cells, **search),
-            _program("count_walkers", "screen", "count_walkers"),
-            _program("begin_walk", "screen", "begin_walk"),
-            _program("walk_sum", "sphere", "walk_sum", **pairs, **kernel),
-            _program("walk_step", "tile", "walk_step", **cells),
-            _program("gather", "sphere", "gather", **pairs, **kernel, WITH_COLORS=int(self.with_colors)),
-            _program("finish", "screen", "finish"),
-            _program("cells_from_cells", "screen", "cells_from_cells"),
-        ]
-        if self.with_starts:
-            sources.append(_program("start", "sphere", "start", **{**all_balls, "STARTS_ONLY": 1}, **kernel))
-        for phase in Phase:
-            name = f"cells_from_pixels_{phase.name.lower()}"
-            sources.append(
-                replace(_program("", "screen", "cells_from_pixels", CELL_SIZE=CELL_SIZE, CELL_PHASE=int(phase)), name=name)
-            )
-            sources.append(
-                replace(_captured("keep", **balls, **cells, CELL_PHASE=int(phase)), name=f"keep_{phase.name.lower()}")
-            )
+        sources = [*self._on_all_balls(), *self._on_pairs(), *self._on_points(), *self._on_pixels()]
         return {source.name: source for source in sources}
+
+    def _on_all_balls(self) -> Iterator[ProgramSource]:
+        """Draw each ball's rectangle."""
+        constants = {**self._balls(), "FROM_PAIRS": 0}
+        yield _program("kernel", "sphere", "kernel", **constants, KERNEL_SPHERES=1, STARTS_ONLY=0)
+        if self.with_starts:
+            kernel = kernel_constants(self.kernel)
+            yield _program("start", "sphere", "start", **constants, **kernel, KERNEL_SPHERES=0, STARTS_ONLY=1)
+
+    def _on_pairs(self) -> Iterator[ProgramSource]:
+        """Draw each ball's rectangle by cells."""
+        constants = {**self._balls(), **self._cells(), "FROM_PAIRS": 1, "KERNEL_SPHERES": 0, "STARTS_ONLY": 0}
+        kernel = kernel_constants(self.kernel)
+        yield _program("peel", "sphere", "peel", **constants)
+        yield _program("walk_sum", "sphere", "walk_sum", **constants, **kernel)
+        yield _program("gather", "sphere", "gather", **constants, **kernel, WITH_COLORS=int(self.with_colors))
+
+    def _on_points(self) -> Iterator[ProgramSource]:
+        """Make pairs, and choose among them."""
+        constants = {**self._balls(), **self._cells()}
+        yield _captured("bin", "bin", **constants, TILING=int(self.options.tiling))
+        for phase in Phase:
+            yield _captured(f"keep_{phase.name.lower()}", "keep", **constants, CELL_PHASE=int(phase))
+        yield _program("group", "group", "group")
+
+    def _on_pixels(self) -> Iterator[ProgramSource]:
+        """Draw the image, or its unfinished cells."""
+        cells, options = self._cells(), self.options
+        begin = {"KERNEL_SPHERES": int(options.kernel_spheres), "WITH_STARTS": int(self.with_starts)}
+        yield _program("begin", "screen", "begin", **begin)
+        yield _program("search", "tile", "search", **cells, **self._search())
+        yield _program("count_walkers", "screen", "count_walkers")
+        yield _program("begin_walk", "screen", "begin_walk")
+        yield _program("walk_step", "tile", "walk_step", **cells)
+        yield _program("finish", "screen", "finish")
+        for phase in Phase:
+            constants = {"CELL_SIZE": CELL_SIZE, "CELL_PHASE": int(phase)}
+            yield _program(f"cells_from_pixels_{phase.name.lower()}", "screen", "cells_from_pixels", **constants)
+        yield _program("cells_from_cells", "screen", "cells_from_cells")
+
+    def _balls(self) -> dict[str, object]:
+        return {"BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH, "TIGHT_RECTANGLES": int(self.options.tight_rectangles)}
+
+    def _cells(self) -> dict[str, object]:
+        return {"CELL_SIZE": CELL_SIZE, "CELL_FACTOR": CELL_FACTOR, "BALL_CULLING": int(self.options.ball_culling)}
+
+    def _search(self) -> dict[str, object]:
+        return {
+            **kernel_constants(self.kernel),
+            "BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH,
+            "LIST_LENGTH": self.list_length,
+            "BEZIER_STACK": BEZIER_STACK if self.options.short_stack else 0,
+            "DIAGNOSTICS": int(self.options.diagnostics),
+        }
 
 
 def all_programs() -> Iterator[ProgramSource]:
@@ -118,17 +134,11 @@ def kernel_constants(kernel: Kernel) -> dict[str, object]:
 
 
 def _program(name: str, vertex: str, fragment: str, **constants: object) -> ProgramSource:
-    return ProgramSource(
-        name, f"{FOLDER}/{vertex}.vert", f"{FOLDER}/{fragment}.frag", constants=tuple(sorted(constants.items()))
-    )
+    files = f"{FOLDER}/{vertex}.vert", f"{FOLDER}/{fragment}.frag"
+    return ProgramSource(name, *files, constants=tuple(sorted(constants.items())))
 
 
-def _captured(name: str, **constants: object) -> ProgramSource:
+def _captured(name: str, stem: str, **constants: object) -> ProgramSource:
     """A program that emits pairs, for transform feedback."""
-    return ProgramSource(
-        name,
-        f"{FOLDER}/{name}.vert",
-        geometry=f"{FOLDER}/{name}.geom",
-        constants=tuple(sorted(constants.items())),
-        varyings=("out_pair",),
-    )
+    files = {"vertex": f"{FOLDER}/{stem}.vert", "geometry": f"{FOLDER}/{stem}.geom"}
+    return ProgramSource(name, **files, constants=tuple(sorted(constants.items())), varyings=("out_pair",))

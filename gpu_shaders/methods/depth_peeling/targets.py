@@ -1,15 +1,42 @@
-"""The images that Depth Peeling draws into."""
+"""What Depth Peeling draws into."""
 
 from __future__ import annotations
 
 import moderngl
 
 from ...buffer_texture import BufferTexture
+from ...capture import Capture
 from ...context import GpuContext
+from ...occlusion import OcclusionQueries
 from .programs import CELL_FACTOR, CELL_SIZE, LIST_TARGETS
 
 FIRST_PAIRS = 2**16
 """Room for pairs to begin with; it grows."""
+
+
+class Workspace:
+    """What is kept from frame to frame on a context; use it within :meth:`GpuContext.run`.
+
+    Attributes
+    ----------
+    capture, queries
+        Transform feedback and occlusion queries.
+    pairs
+        Of balls and cells: all, and two for those that are left of them.
+    """
+
+    def __init__(self, context: GpuContext) -> None:
+        self.capture = Capture(context)
+        self.queries = OcclusionQueries(context)
+        self.pairs = [BufferTexture(context, FIRST_PAIRS) for _ in range(3)]
+        self._context = context
+        self._targets: Targets | None = None
+
+    def targets(self, size: tuple[int, int], with_iterations: bool) -> Targets:
+        """The images of this size, new ones where the last were of another."""
+        if self._targets is None or (self._targets.size, self._targets.with_iterations) != (size, with_iterations):
+            self._targets = Targets(self._context, size, with_iterations)
+        return self._targets
 
 
 class Targets:
@@ -37,7 +64,7 @@ class Targets:
         self.outputs = [floats(4) for _ in range(2)]
         self.kernel = gl.framebuffer([], self.kernel_depth)
         self.start = gl.framebuffer([self.start_density])
-        self.begin = gl.framebuffer([self.lists[0][0], self.barrier], self.depths[0])
+        self.begin = gl.framebuffer([self.lists[0][0], self.lists[1][0], self.barrier], self.depths[0])
         self.peel = [gl.framebuffer([self.crossing], depth) for depth in self.depths]
         self.search = [
             gl.framebuffer([*self.lists[index], *self.iterations[index : index + 1]], self.depths[index]) for index in range(2)
@@ -47,8 +74,6 @@ class Targets:
         self.gather = gl.framebuffer(self.sums)
         self.finish = gl.framebuffer(self.outputs)
         self.cells = CellTargets(gl, size)
-        # The first pairs, and two for those that are left of them.
-        self.pairs = [BufferTexture(context, FIRST_PAIRS) for _ in range(3)]
 
 
 class CellTargets:
