@@ -83,6 +83,14 @@ def test_rays_whose_lists_are_too_short_arrive_all_the_same(scene_name, kernel, 
     judge(image, scene, camera)
 
 
+def test_rays_that_walk_end_at_the_far_clip_distance(depth_peeling):
+    scene = replace(SCENES["ten_balls"](), clip_end=3.6)
+    camera = scene.camera("perspective")
+    image = depth_peeling(scene, camera, list_length=1)
+    assert image.info.counts["overflows"] > 100
+    judge(image, scene, camera)
+
+
 def test_pairs_that_do_not_fit_make_their_buffer_grow(depth_peeling, monkeypatch):
     monkeypatch.setattr(targets, "FIRST_PAIRS", 1)
     scene = SCENES["ten_balls"]()
