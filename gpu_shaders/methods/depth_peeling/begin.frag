@@ -12,8 +12,7 @@ uniform float isovalue;
 #endif
 
 layout(location = 0) out uvec4 out_state;
-layout(location = 1) out uvec4 out_older_state;
-layout(location = 2) out float out_barrier;
+layout(location = 1) out float out_barrier;
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -29,7 +28,6 @@ void main() {
         barrier = NO_BARRIER;
 #endif
     out_state = uvec4(state_pack(state), 0u, 0u);
-    out_older_state = out_state;
     out_barrier = barrier;
     gl_FragDepth = barrier;
 }

@@ -62,7 +62,7 @@ class Frame:
         self._variant = variant
         self._ball_count = ball_count
         self._check_cancelled = check_cancelled
-        # Which of each pair of targets holds the present state.
+        # Which of each pair of targets holds the present state, and the depth buffer for the next peel.
         self._now = 0
         self._steps = {name: Step(context, source) for name, source in variant.programs().items()}
         self._cells = self._targets.cells
@@ -85,9 +85,9 @@ class Frame:
         """
         self._gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
         self._begin()
-        self._measure_cells(Phase.PEELING)
         pairs = self._bin(group_starts, group_corners)
-        counts = {"pairs": pairs.count, "peels": self._peel(pairs)}
+        self._enter(pairs)
+        counts = {"pairs": pairs.count, "peels": 1 + self._peel(pairs)}
         if self._variant.options.diagnostics:
             counts.update(self._diagnostics(pairs))
         counts["overflows"] = self._count_walkers()
@@ -121,6 +121,7 @@ class Frame:
             self._blend(moderngl.FUNC_ADD)
             self._over_balls("start", targets.start, moderngl.BLEND, kernel_depth_tx=targets.kernel_depth)
         self._over_screen("begin", targets.begin, kernel_depth_tx=targets.kernel_depth, start_tx=targets.start_density)
+        self._measure_cells(Phase.PEELING, targets.first_state, targets.first_state)
 
     def _bin(self, starts: npt.NDArray[np.int64], corners: npt.NDArray[np.float32] | None) -> Pairs:
         """The pairs of balls and cells that may matter."""
@@ -163,14 +164,26 @@ class Frame:
             count = self._workspace.capture.points(step.vertex_array(), ranges, output.buffer)
         return Pairs(output, count)
 
-    def _measure_cells(self, phase: Phase) -> None:
-        """What the cells of the image ask for now."""
-        cells, older = self._cells, self._targets.lists[1 - self._now][0]
-        read = {"state_tx": self._state(), "older_state_tx": older, "barrier_tx": self._targets.barrier}
+    def _ask_cells(self, phase: Phase) -> None:
+        """Measure the cells by the pixels' present states."""
+        self._measure_cells(phase, self._state(), self._targets.lists[1 - self._now][0])
+
+    def _measure_cells(self, phase: Phase, state: Texture, older_state: Texture) -> None:
+        """What the cells of the image ask for."""
+        cells = self._cells
+        read = {"state_tx": state, "older_state_tx": older_state, "barrier_tx": self._targets.barrier}
         self._over_screen(f"cells_from_pixels_{phase.name.lower()}", cells.framebuffers[0], **read)
         for level in range(1, len(cells.levels)):
             self._steps["cells_from_cells"].set_uniforms({"smaller_count": cells.factors[level]})
             self._over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])
+
+    def _enter(self, pairs: Pairs) -> None:
+        """Peel for the first time: rays enter their first ball or are done."""
+        targets = self._targets
+        self._over_pairs("peel", targets.peel[0], moderngl.DEPTH_TEST, pairs, state_tx=targets.first_state)
+        read = {"state_tx": targets.first_state, "crossing_tx": targets.crossing, "depth_tx": targets.depths[0]}
+        self._over_screen("enter", targets.enter, barrier_tx=targets.barrier, **read)
+        self._now = 1
 
     def _peel(self, pairs: Pairs) -> int:
         """Peel and search until nothing is left to peel; how often."""
@@ -192,7 +205,6 @@ class Frame:
         targets = self._targets
         self._over_screen("begin_walk", targets.state_only[1 - self._now], state_tx=self._state())
         self._turn()
-        self._measure_cells(Phase.WALKING)
 
         def one_step(pairs: Pairs, query: OcclusionQuery) -> None:
             targets.walk.clear(0.0, 0.0, 0.0, 2.0)
@@ -202,7 +214,7 @@ class Frame:
             read = {"state_tx": self._state(), "sums_tx": targets.sums[0], "barrier_tx": targets.barrier}
             self._over_tiles("walk_step", targets.state_only[1 - self._now], **read)
 
-        return self._until_nothing_is_left(one_step, self._keep(pairs, Phase.WALKING), Phase.WALKING)
+        return self._until_nothing_is_left(one_step, pairs, Phase.WALKING)
 
     def _until_nothing_is_left(self, one_pass: Callable[[Pairs, OcclusionQuery], None], pairs: Pairs, phase: Phase) -> int:
         """Repeat a pass over the pairs, each only if the pass before has drawn something; how often.
@@ -213,8 +225,10 @@ class Frame:
         previous: OcclusionQuery | None = None
         batch = FIRST_BATCH
         while True:
-            queries = self._workspace.queries.take(batch)
             self._check_cancelled()
+            self._ask_cells(phase)
+            pairs = self._keep(pairs, phase)
+            queries = self._workspace.queries.take(batch)
             before = self._now
             for query in queries:
                 with nullcontext() if previous is None else previous.required():
@@ -229,8 +243,6 @@ class Frame:
             if not all(drawn):
                 return passes
             batch = min(2 * batch, LARGEST_BATCH)
-            self._measure_cells(phase)
-            pairs = self._keep(pairs, phase)
 
     def _count_walkers(self) -> int:
         """How many rays had lists that were too short."""
@@ -243,7 +255,7 @@ class Frame:
     def _gather(self, pairs: Pairs) -> None:
         """Sum the gradient and the colours at the surface; make the outputs."""
         targets = self._targets
-        self._measure_cells(Phase.DONE)
+        self._ask_cells(Phase.DONE)
         targets.gather.clear()
         self._blend(moderngl.FUNC_ADD)
         self._over_pairs("gather", targets.gather, moderngl.BLEND, self._keep(pairs, Phase.DONE), state_tx=self._state())

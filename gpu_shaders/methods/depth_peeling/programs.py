@@ -87,6 +87,7 @@ class Variant:
         cells, options = self._cells(), self.options
         begin = {"KERNEL_SPHERES": int(options.kernel_spheres), "WITH_STARTS": int(self.with_starts)}
         yield _program("begin", "screen", "begin", **begin)
+        yield _program("enter", "screen", "enter")
         yield _program("search", "tile", "search", **cells, **self._search())
         yield _program("count_walkers", "screen", "count_walkers")
         yield _program("begin_walk", "screen", "begin_walk")

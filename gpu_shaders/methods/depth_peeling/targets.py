@@ -64,7 +64,10 @@ class Targets:
         self.outputs = [floats(4) for _ in range(2)]
         self.kernel = gl.framebuffer([], self.kernel_depth)
         self.start = gl.framebuffer([self.start_density])
-        self.begin = gl.framebuffer([self.lists[0][0], self.lists[1][0], self.barrier], self.depths[0])
+        # Before the first peel the state lies where later the second texel of the list does.
+        self.first_state = self.lists[0][1]
+        self.begin = gl.framebuffer([self.first_state, self.barrier], self.depths[0])
+        self.enter = gl.framebuffer([self.lists[0][0], self.lists[1][0]], self.depths[1])
         self.peel = [gl.framebuffer([self.crossing], depth) for depth in self.depths]
         self.search = [
             gl.framebuffer([*self.lists[index], *self.iterations[index : index + 1]], self.depths[index]) for index in range(2)
