@@ -143,8 +143,10 @@ class GpuContext:
         """Whether OpenGL runs on the CPU here."""
         return any(name in self.renderer.lower() for name in _SOFTWARE)
 
-    def require(self, version: int, draw_buffers: int = 0) -> None:
-        """Raise DeviceError unless the context has at least this OpenGL version (330) and so many render targets."""
+    def require(self, version: int, draw_buffers: int = 0, texture_size: int = 0) -> None:
+        """Raise DeviceError unless the context has at least this OpenGL version (330), and so many render targets at once and
+        texels along a texture's side.
+        """
         if self.version < version:
             raise DeviceError(
                 f"OpenGL {version // 100}.{version // 10 % 10} is needed but {self.renderer} offers "
@@ -153,6 +155,11 @@ class GpuContext:
         if self.limits.draw_buffers < draw_buffers:
             raise DeviceError(
                 f"{draw_buffers} render targets at once are needed but {self.renderer} offers {self.limits.draw_buffers}; "
+                "choose another method"
+            )
+        if self.limits.texture_size < texture_size:
+            raise DeviceError(
+                f"Textures of {texture_size} texels a side are needed but {self.renderer} offers {self.limits.texture_size}; "
                 "choose another method"
             )
 

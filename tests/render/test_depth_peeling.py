@@ -101,20 +101,38 @@ def test_pairs_that_do_not_fit_make_their_buffer_grow(depth_peeling, monkeypatch
 
 
 @pytest.mark.parametrize("limit", [40, 96])
-def test_images_wider_than_a_texture_are_drawn_in_parts(limit, depth_peeling, pretend_limits):
+def test_images_wider_than_a_viewport_are_drawn_in_parts(limit, depth_peeling, pretend_limits):
     scene = SCENES["ten_balls"]()
     camera = scene.camera("perspective")
     whole = depth_peeling(scene, camera)
-    pretend_limits(texture_size=limit, viewport_size=limit)
+    pretend_limits(viewport_size=limit)
     in_parts = depth_peeling(scene, camera)
     judge(in_parts, scene, camera)
     np.testing.assert_array_equal(in_parts.hit, whole.hit)
 
 
-def test_too_few_render_targets_are_an_error(depth_peeling, pretend_limits):
+def test_images_wider_than_a_texture_are_drawn_in_parts(depth_peeling, pretend_limits):
+    scene = SCENES["ten_balls"]()
+    camera = replace(scene.camera("orthographic"), width=5000, height=3)
+    whole = depth_peeling(scene, camera)
+    pretend_limits(texture_size=4096)
+    in_parts = depth_peeling(scene, camera)
+    assert 0.1 < whole.hit.mean() < 0.9
+    np.testing.assert_array_equal(in_parts.hit, whole.hit)
+    np.testing.assert_allclose(in_parts["depth"], whole["depth"], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ({"draw_buffers": 3}, "4 render targets at once are needed"),
+        ({"texture_size": 1024}, "Textures of 4096 texels a side are needed"),
+    ],
+)
+def test_a_context_that_takes_too_little_is_an_error(limits, message, depth_peeling, pretend_limits):
     scene = SCENES["one_ball"]()
-    pretend_limits(draw_buffers=3)
-    with pytest.raises(DeviceError, match="4 render targets at once are needed"):
+    pretend_limits(**limits)
+    with pytest.raises(DeviceError, match=message):
         depth_peeling(scene, scene.camera("perspective"))
 
 

@@ -19,7 +19,7 @@ from .frame import Frame
 from .groups import Groups, ball_groups
 from .options import Options
 from .params import MAX_BALLS, METHOD
-from .programs import LIST_LENGTH, LIST_TARGETS, Variant
+from .programs import BALL_TEXTURE_WIDTH, LIST_LENGTH, LIST_TARGETS, Variant
 from .targets import Workspace
 
 # An image of this many pixels takes some 250 MB; a larger one is drawn in parts.
@@ -41,7 +41,8 @@ class DepthPeeling:
 
     def __init__(self, context: GpuContext, options: Options | None = None, list_length: int = LIST_LENGTH) -> None:
         self._options = options or Options()
-        context.require(METHOD.gl_version, LIST_TARGETS + self._options.diagnostics)
+        # The balls fill a square texture at most.
+        context.require(METHOD.gl_version, LIST_TARGETS + self._options.diagnostics, BALL_TEXTURE_WIDTH)
         self._context = context
         self._list_length = list_length
         self._workspace: Workspace | None = None
