@@ -1,7 +1,8 @@
 // Cells: squares of the image, in levels: of CELL_SIZE pixels, of CELL_FACTOR times that, and once more; the last level's only
-// cell is the whole image. For each level a texture holds the range of distances that its pixels still ask for: the least of the distances that
-// they have reached, the greatest of those that they want to reach. Where none asks for anything, the range is empty.
+// cell is the whole image. For each level a texture holds the range of distances that its pixels still ask for: from the least
+// distance that one has reached to the greatest that one wants to reach. Where none asks for anything it is empty.
 // A cell's number: level (2 bits), y (15 bits), x (15 bits).
+#include "methods/depth_peeling/range.glsl"
 
 uniform sampler2D cells_0_tx;
 uniform sampler2D cells_1_tx;
@@ -10,7 +11,6 @@ uniform sampler2D cells_3_tx;
 
 const uint WHOLE_IMAGE = 3u;
 const int CELLS_ACROSS = 4; // at most, of one ball
-const vec2 EMPTY_RANGE = vec2(4.0, -4.0);
 
 uint cell_number(uint level, ivec2 cell) {
     return level << 30u | uint(cell.y) << 15u | uint(cell.x);
@@ -41,7 +41,7 @@ vec2 cell_range(uint level, ivec2 cell) {
 // Whether a cell asks for anything between two scaled distances.
 bool cell_wants(uint level, ivec2 cell, float nearest, float farthest) {
     vec2 range = cell_range(level, cell);
-    bool wants = range.x <= range.y && range.x <= farthest;
+    bool wants = !range_is_empty(range) && range.x <= farthest;
 #if BALL_CULLING
     wants = wants && nearest <= range.y;
 #endif

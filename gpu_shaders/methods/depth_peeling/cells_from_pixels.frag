@@ -1,5 +1,6 @@
 // The range of distances that the pixels of a fine cell ask for: PHASE_PEELING or PHASE_WALKING from their last crossing to
 // their barrier, PHASE_DONE at their surface. A pixel goes on asking until both of its states know that it is done.
+#include "methods/depth_peeling/range.glsl"
 #include "methods/depth_peeling/state.glsl"
 
 uniform usampler2D state_tx;
@@ -10,26 +11,22 @@ layout(location = 0) out vec2 out_range;
 
 vec2 pixel_range(ivec2 pixel) {
     State state = state_unpack(texelFetch(state_tx, pixel, 0).xy);
-    vec2 none = vec2(4.0, -4.0);
 #if CELL_PHASE == 2
-    return state_has_surface(state) ? vec2(state.depth) : none;
+    return state_has_surface(state) ? vec2(state.depth) : EMPTY_RANGE;
 #else
     if (state.phase == uint(CELL_PHASE))
         return vec2(state.depth, texelFetch(barrier_tx, pixel, 0).x);
     State older = state_unpack(texelFetch(older_state_tx, pixel, 0).xy);
-    return older.phase == uint(CELL_PHASE) ? vec2(older.depth) : none;
+    return older.phase == uint(CELL_PHASE) ? vec2(older.depth) : EMPTY_RANGE;
 #endif
 }
 
 void main() {
     ivec2 corner = ivec2(gl_FragCoord.xy) * CELL_SIZE;
     ivec2 last = textureSize(state_tx, 0) - 1;
-    vec2 range = vec2(4.0, -4.0);
-    for (int y = 0; y < CELL_SIZE; y++) {
-        for (int x = 0; x < CELL_SIZE; x++) {
-            vec2 other = pixel_range(min(corner + ivec2(x, y), last));
-            range = vec2(min(range.x, other.x), max(range.y, other.y));
-        }
-    }
+    vec2 range = EMPTY_RANGE;
+    for (int y = 0; y < CELL_SIZE; y++)
+        for (int x = 0; x < CELL_SIZE; x++)
+            range = range_join(range, pixel_range(min(corner + ivec2(x, y), last)));
     out_range = range;
 }

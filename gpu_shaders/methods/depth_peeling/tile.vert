@@ -9,7 +9,7 @@ void main() {
     int index = gl_VertexID / 6;
     ivec2 cell = ivec2(index % cells_across, index / cells_across);
     vec2 range = cell_range(0u, cell);
-    vec2 corner = range.x <= range.y ? square_corner(gl_VertexID % 6) : vec2(0.0);
+    vec2 corner = range_is_empty(range) ? vec2(0.0) : square_corner(gl_VertexID % 6);
     vec2 position = (vec2(cell) + corner) * cell_size(0u) / vec2(image_size);
     gl_Position = vec4(min(2.0 * position - 1.0, 1.0), 0.0, 1.0);
 }

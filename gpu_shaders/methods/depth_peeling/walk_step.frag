@@ -13,16 +13,32 @@ layout(location = 0) out uvec4 out_state;
 // A step of this share of the distance is as good as none.
 const float WALK_RESOLUTION = 3e-7;
 
-struct Step {
-    float advance; // Blender units
-    bool arrives;
-};
-
-Step safe_step(float to_go, float slope, float bound) {
+// The length of the step, 0 on the surface; Blender units. `sums`: see walk_sum.frag.
+float safe_step(float to_go, vec4 sums) {
     if (to_go <= 0.0)
-        return Step(0.0, true);
+        return 0.0;
+    float slope = sums.y, bound = sums.z;
     float divisor = slope + sqrt(slope * slope + 2.0 * bound * to_go);
-    return Step(divisor > 0.0 ? 2.0 * to_go / divisor : 1e30, false);
+    return divisor > 0.0 ? 2.0 * to_go / divisor : 1e30;
+}
+
+// The state after a step, which ends with the window that the sums are made for. The next window is as long as seems useful.
+State walk(State state, inout float window, vec4 sums, float barrier, Ray ray) {
+    float begin = state.depth / depth_scale;
+    float resolution = WALK_RESOLUTION * begin;
+    float side = state.is_inside ? -1.0 : 1.0;
+    float advance = safe_step(side * isovalue - sums.x, sums);
+    if (advance <= 0.0)
+        return state_done(state, state.depth);
+    bool is_in_window = advance < window;
+    state.depth = (begin + max(min(advance, window), resolution)) * depth_scale;
+    // Where no ball is in the window either, on to the next one.
+    if (!is_in_window && sums.xyz == vec3(0.0))
+        state.depth = max(state.depth, sums.w);
+    window = max(2.0 * min(advance, window), resolution);
+    if (state.depth > min(barrier, clip_end(ray)))
+        return state_done(state, barrier < NO_BARRIER ? barrier : NO_SURFACE);
+    return advance <= resolution ? state_done(state, state.depth) : state;
 }
 
 void main() {
@@ -31,31 +47,8 @@ void main() {
     State state = state_unpack(texel.xy);
     float window = uintBitsToFloat(texel.z);
     if (state.phase == PHASE_WALKING) {
-        Ray ray = ray_from_pixel(gl_FragCoord.xy);
-        vec4 sums = texelFetch(sums_tx, pixel, 0);
-        float begin = state.depth / depth_scale;
-        float resolution = WALK_RESOLUTION * begin;
-        float side = state.is_inside ? -1.0 : 1.0;
-        Step next = safe_step(side * isovalue - sums.x, sums.y, sums.z);
-        bool is_near = next.advance <= resolution;
-        if (next.advance < window) {
-            state.depth = (begin + max(next.advance, resolution)) * depth_scale;
-            window = max(2.0 * next.advance, resolution);
-        } else {
-            // Nothing in the window; where no ball is either, on to the next one.
-            state.depth = (begin + window) * depth_scale;
-            if (sums.xyz == vec3(0.0))
-                state.depth = max(state.depth, sums.w);
-            window = max(2.0 * window, resolution);
-        }
         float barrier = texelFetch(barrier_tx, pixel, 0).x;
-        float end = min(barrier, clip_end(ray));
-        if (next.arrives)
-            state = state_done(state, begin * depth_scale);
-        else if (state.depth > end)
-            state = state_done(state, barrier < NO_BARRIER ? barrier : NO_SURFACE);
-        else if (is_near)
-            state = state_done(state, state.depth);
+        state = walk(state, window, texelFetch(sums_tx, pixel, 0), barrier, ray_from_pixel(gl_FragCoord.xy));
     }
     out_state = uvec4(state_pack(state), floatBitsToUint(window), 0u);
 }
