@@ -63,8 +63,13 @@ class OcclusionQuery:
         self._queries._end_condition()
 
     @property
-    def answer(self) -> bool:
-        """Whether there were samples; waits until that is known."""
+    def samples(self) -> int:
+        """How many there were; waits until that is known."""
         result = ctypes.c_uint()
         self._queries._get(self._name, _GL_QUERY_RESULT, ctypes.byref(result))
-        return bool(result.value)
+        return result.value
+
+    @property
+    def answer(self) -> bool:
+        """Whether there were samples; waits until that is known."""
+        return self.samples > 0

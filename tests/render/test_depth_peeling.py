@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import fields, replace
 
 import numpy as np
@@ -187,3 +188,20 @@ def test_a_million_balls_on_one_pixel(weight, depth_peeling):
     np.testing.assert_array_equal(image.hit, expected.hit)
     assert np.count_nonzero(image.hit) == 1
     np.testing.assert_allclose(image["depth"][image.hit], expected["depth"][image.hit], atol=3e-5)
+
+
+@pytest.mark.parametrize("kind", ["Query", "Texture", "Buffer", "Framebuffer"])
+def test_frames_leave_nothing_behind_in_opengl(kind, opengl):
+    is_one = opengl.function(f"glIs{kind}", ctypes.c_uint, result=ctypes.c_ubyte)
+    scene = SCENES["long_lists"]()
+
+    def count_after(width):
+        camera = replace(scene.camera("perspective"), width=width, height=8)
+        image = meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
+        assert image.info.counts["overflows"] > 0
+        return opengl.run(lambda: sum(is_one(name) for name in range(1, 10_000)))
+
+    count_after(20)
+    first = count_after(21)
+    assert first > 0
+    assert [count_after(20), count_after(21)] == [first, first]

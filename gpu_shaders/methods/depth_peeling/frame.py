@@ -246,11 +246,11 @@ class Frame:
 
     def _count_walkers(self) -> int:
         """How many rays had lists that were too short."""
-        query = self._gl.query(samples=True)
-        with query:
+        query = self._workspace.queries.take(1)[0]
+        with query.asked():
             # Anything without colours will do.
             self._over_screen("count_walkers", self._targets.kernel, state_tx=self._state())
-        return int(query.samples)
+        return query.samples
 
     def _gather(self, pairs: Pairs) -> None:
         """Sum the gradient and the colours at the surface; make the outputs."""
