@@ -205,3 +205,13 @@ def test_frames_leave_nothing_behind_in_opengl(kind, opengl):
     first = count_after(21)
     assert first > 0
     assert [count_after(20), count_after(21)] == [first, first]
+
+
+def test_diagnostics_of_a_ball_that_no_ray_meets(depth_peeling):
+    # Smaller than a pixel, and between the rays of two.
+    scene = Scene(meniscus.Balls([[0, 0, 0]], 0.01))
+    camera = replace(scene.camera("orthographic"), width=2, height=1)
+    image = depth_peeling(scene, camera, options=Options(diagnostics=True))
+    assert image.info.counts["balls_drawn"] == 1
+    assert image.info.counts["balls_kept"] == 0
+    assert not image.hit.any()

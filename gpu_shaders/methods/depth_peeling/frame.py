@@ -264,7 +264,8 @@ class Frame:
 
     def _diagnostics(self, pairs: Pairs) -> dict[str, int]:
         """Counts that cost time."""
-        words = np.frombuffer(pairs.texture.buffer.read(8 * pairs.count), np.uint32).reshape(-1, 2)
+        # No driver reads nothing.
+        words = np.frombuffer(pairs.texture.buffer.read(8 * max(pairs.count, 1)), np.uint32).reshape(-1, 2)[: pairs.count]
         width, height = self._targets.size
         iterations = np.frombuffer(self._targets.iterations[self._now].read(), np.uint32).reshape(height, width, 4)
         return {
