@@ -11,6 +11,7 @@ from judge import judge
 from scenes import SCENES, Scene
 
 import meniscus
+from meniscus.addon.fluid.camera import Region
 from meniscus.addon.fluid.errors import DeviceError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.gpu_shaders.capture import Capture
@@ -215,3 +216,16 @@ def test_diagnostics_of_a_ball_that_no_ray_meets(depth_peeling):
     assert image.info.counts["balls_drawn"] == 1
     assert image.info.counts["balls_kept"] == 0
     assert not image.hit.any()
+
+
+def test_all_balls_around_the_eye_are_entered_where_rays_start(depth_peeling):
+    # In this corner of a long lens' view single precision rounds the start of every ray up.
+    positions = np.random.default_rng(1).normal(0, 0.05, (12, 3))
+    scene = Scene(meniscus.Balls(positions, 1.0, weights=np.full(12, 0.06)))
+    camera = meniscus.Camera.perspective(
+        (0, 0, 0), (0, 1, 0), fov_y=0.0006474176732563575, width=64, height=64, clip_start=0.3791574282732325
+    )
+    corner = replace(camera, region=Region(56, 56, 64, 64)).cropped()
+    image = depth_peeling(scene, corner)
+    assert image.info.counts["peels"] > 12
+    judge(image, scene, corner)

@@ -52,7 +52,7 @@ class BallDistances:
     depth_scale
         A power of two, so that scaling loses nothing, which brings all distances below 1/2.
     farthest_start
-        The greatest distance at which a ray starts, scaled.
+        The greatest distance at which a ray starts, scaled; not below the true one.
     with_starts
         Whether a ray may start inside the fluid, or a ball has a negative weight.
     """
@@ -68,7 +68,8 @@ class BallDistances:
         start = camera.clip_start * float(np.hypot.reduce([1.0, *_steepest_slope(camera)]))
         scale = 2.0 ** -(np.ceil(np.log2(max(float(np.max(distances + balls.radii)), start))) + 1)
         may_start_inside = bool(np.any(distances - balls.radii <= start * (1 + 1e-5)))
-        return cls(float(scale), start * float(scale), may_start_inside or bool(np.any(balls.weights < 0)))
+        # The shaders round where each ray starts, and must not find it beyond the greatest.
+        return cls(float(scale), start * float(scale) * (1 + 1e-6), may_start_inside or bool(np.any(balls.weights < 0)))
 
 
 def _steepest_slope(camera: Camera) -> tuple[float, float]:
