@@ -229,3 +229,40 @@ def test_all_balls_around_the_eye_are_entered_where_rays_start(depth_peeling):
     image = depth_peeling(scene, corner)
     assert image.info.counts["peels"] > 12
     judge(image, scene, corner)
+
+
+@pytest.mark.parametrize("switch", ["diagnostics", "group_queries"])
+def test_nothing_is_read_where_it_is_drawn(switch, opengl, depth_peeling, monkeypatch):
+    """llvmpipe forgives it, others then read what was there before."""
+    read: dict = {}
+    clashes: set = set()
+    use_textures, draw, points = Step.use_textures, Step.draw, Capture.points
+
+    def note(step, textures):
+        read.clear()
+        read.update({name: textures.get(name) or step.textures[name] for name in step._units})
+        use_textures(step, textures)
+
+    def compare(framebuffer, output=None):
+        written = [*framebuffer.color_attachments, framebuffer.depth_attachment, output]
+        for name, texture in read.items():
+            if texture in written or (output and getattr(texture, "buffer", None) is output):
+                clashes.add(name)
+
+    def drawn(step, framebuffer, *arguments):
+        draw(step, framebuffer, *arguments)
+        compare(framebuffer)
+
+    def captured(capture, array, ranges, output):
+        # Although nothing is drawn into it.
+        compare(opengl.gl.fbo, output)
+        return points(capture, array, ranges, output)
+
+    for owner, name, function in ((Step, "use_textures", note), (Step, "draw", drawn), (Capture, "points", captured)):
+        monkeypatch.setattr(owner, name, function)
+    for scene_name in ("long_lists", "negative_weights"):
+        scene = SCENES[scene_name]()
+        camera = replace(scene.camera("perspective"), width=32, height=24)
+        depth_peeling(scene, camera, options=replace(Options(), **{switch: not getattr(Options(), switch)}))
+    assert read
+    assert clashes == set()

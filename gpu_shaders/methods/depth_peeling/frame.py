@@ -157,6 +157,8 @@ class Frame:
 
     def _captured(self, output: BufferTexture, step: Step, ranges: Sequence[Range], **textures: Texture) -> Pairs:
         """What a step emits from ranges of points; once more where the buffer was too small."""
+        # The cells were drawn last, and must not be read while they are drawn into.
+        self._targets.kernel.use()
         step.use_textures({**textures, **self._cells.textures})
         count = self._workspace.capture.points(step.vertex_array(), ranges, output.buffer)
         if count > output.capacity:
