@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from judge import judge
+from judge import compare, judge
 from scenes import SCENES, Scene
 
 import meniscus
@@ -266,3 +266,15 @@ def test_nothing_is_read_where_it_is_drawn(switch, opengl, depth_peeling, monkey
         depth_peeling(scene, camera, options=replace(Options(), **{switch: not getattr(Options(), switch)}))
     assert read
     assert clashes == set()
+
+
+def test_walks_do_not_end_before_a_steep_ball(depth_peeling):
+    # Where a linear kernel begins its slope is all there at once; with such a weight safe steps towards it are tiny.
+    balls = meniscus.Balls([[-0.1, 0, 0], [0.1, 0, 0], [0, 0.4, 0]], [1.0, 1.0, 0.5], weights=[0.09, 0.09, 1e6])
+    scene = Scene(balls, field=meniscus.Field("power_1", 0.2), view_height=0.8)
+    camera = scene.camera("orthographic")
+    image = depth_peeling(scene, camera, list_length=1)
+    assert image.info.counts["overflows"] > 1000
+    verdict = compare(image, scene, camera)
+    assert verdict.compared > 1000
+    assert not verdict.wrong

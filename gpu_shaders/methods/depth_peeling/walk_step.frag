@@ -1,5 +1,6 @@
 // Takes the step that surely does not pass the surface: with g to go, the slope s and a bound M on how fast it rises,
-// 2 g / (s + sqrt(s^2 + 2 M g)). Close to the surface the steps become Newton's.
+// 2 g / (s + sqrt(s^2 + 2 M g)). Close to the surface the steps become Newton's, and the last one, which has a least length,
+// passes it. A tiny step alone does not tell that the surface is near: a bound on what is only ahead may make it so.
 #include "lib/ray.glsl"
 #include "methods/depth_peeling/clip.glsl"
 
@@ -38,7 +39,7 @@ State walk(State state, inout float window, vec4 sums, float barrier, Ray ray) {
     window = max(2.0 * min(advance, window), resolution);
     if (state.depth > min(barrier, clip_end(ray)))
         return state_done(state, barrier < NO_BARRIER ? barrier : NO_SURFACE);
-    return advance <= resolution ? state_done(state, state.depth) : state;
+    return state;
 }
 
 void main() {
