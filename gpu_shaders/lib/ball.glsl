@@ -48,11 +48,6 @@ float chord_half_length(Chord chord) {
     return chord.radius * sqrt(max(chord.peak, 0.0));
 }
 
-// The square of half the chord of a concentric sphere; negative where the ray misses that.
-float chord_half_length_2(Chord chord, float sphere_radius) {
-    return sphere_radius * sphere_radius - (1.0 - chord.peak) * chord.radius * chord.radius;
-}
-
 float chord_x(Chord chord, float t) {
     float from_middle = (t - chord.middle) / chord.radius;
     return chord.peak - from_middle * from_middle;

@@ -22,14 +22,14 @@ void bezier_note(int steps) {
 
 // De Casteljau's algorithm in place. The loops count up: Mesa 22 unrolls such loops wrongly where they count down.
 void bezier_keep_right(inout float p[KERNEL_DEGREE + 1], float u) {
-    for (int step = 1; step <= KERNEL_DEGREE; step++)
-        for (int j = 0; j <= KERNEL_DEGREE - step; j++)
+    for (int level = 1; level <= KERNEL_DEGREE; level++)
+        for (int j = 0; j <= KERNEL_DEGREE - level; j++)
             p[j] = mix(p[j], p[j + 1], u);
 }
 
 void bezier_keep_left(inout float p[KERNEL_DEGREE + 1], float u) {
-    for (int step = 1; step <= KERNEL_DEGREE; step++)
-        for (int j = 0; j <= KERNEL_DEGREE - step; j++)
+    for (int level = 1; level <= KERNEL_DEGREE; level++)
+        for (int j = 0; j <= KERNEL_DEGREE - level; j++)
             p[KERNEL_DEGREE - j] = mix(p[KERNEL_DEGREE - j - 1], p[KERNEL_DEGREE - j], u);
 }
 
@@ -64,10 +64,10 @@ vec2 bezier_hull_crossing(float p[KERNEL_DEGREE + 1]) {
 // Halves a segment: `p` becomes the left half.
 void bezier_split(inout float p[KERNEL_DEGREE + 1], out float right[KERNEL_DEGREE + 1]) {
     right = p;
-    for (int step = 1; step <= KERNEL_DEGREE; step++) {
-        for (int j = 0; j <= KERNEL_DEGREE - step; j++)
+    for (int level = 1; level <= KERNEL_DEGREE; level++) {
+        for (int j = 0; j <= KERNEL_DEGREE - level; j++)
             right[j] = 0.5 * (right[j] + right[j + 1]);
-        p[step] = right[0];
+        p[level] = right[0];
     }
 }
 
@@ -123,8 +123,8 @@ float bezier_first_root(float p[KERNEL_DEGREE + 1]) {
     bool has_root = false; // a segment with one sign change was met
     int pushed = 0, waiting = 0;
     int steps = 0;
-    for (int step = 0; step < BEZIER_STEPS; step++) {
-        steps = step;
+    for (int iteration = 0; iteration < BEZIER_STEPS; iteration++) {
+        steps = iteration;
         if (segment[0] >= 0.0)
             break;
         int changes = bezier_sign_changes(segment);

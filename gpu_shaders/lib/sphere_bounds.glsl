@@ -39,20 +39,21 @@ vec4 sphere_rectangle(vec3 center, float radius) {
 
 // The least distance of a sphere along any ray, not above the true one.
 float sphere_nearest(vec3 center, float radius) {
-    float distance = is_perspective ? length(center) : -center.z;
-    return distance - radius - 1e-6 * (abs(distance) + radius);
+    float to_center = is_perspective ? length(center) : -center.z;
+    return to_center - radius - 1e-6 * (abs(to_center) + radius);
 }
 
 // The greatest distance at which any ray leaves a sphere, not below the true one.
 float sphere_farthest(vec3 center, float radius) {
-    float distance = is_perspective ? length(center) : -center.z;
-    return distance + radius + 1e-6 * (abs(distance) + radius);
+    float to_center = is_perspective ? length(center) : -center.z;
+    return to_center + radius + 1e-6 * (abs(to_center) + radius);
 }
 
 // The greatest distance at which any ray enters a sphere: along the tangents. Not below the true one.
 float sphere_farthest_entry(vec3 center, float radius) {
     if (!is_perspective)
         return -center.z + 1e-6 * (abs(center.z) + radius);
-    float distance = length(center);
-    return sqrt(max((distance - radius) * (distance + radius), 0.0)) + 1e-6 * (distance + radius);
+    float to_center = length(center);
+    float tangent_2 = max((to_center - radius) * (to_center + radius), 0.0) + 4e-7 * to_center * to_center;
+    return sqrt(tangent_2) + 1e-6 * (to_center + radius);
 }

@@ -71,7 +71,8 @@ class Frame:
         """Give every step the balls and the camera."""
         for step in self._steps.values():
             step.set_uniforms({**uniforms, "cells_across": self._cells.across})
-            step.textures.update(textures)
+            # Drivers may ask for the cells even where a program has them only from an include.
+            step.textures.update({**textures, **self._cells.textures})
 
     def draw(self, group_starts: npt.NDArray[np.int64], group_corners: npt.NDArray[np.float32] | None) -> dict[str, int]:
         """Find the surface; counts of what happened.
@@ -159,7 +160,7 @@ class Frame:
         """What a step emits from ranges of points; once more where the buffer was too small."""
         # The cells were drawn last, and must not be read while they are drawn into.
         self._targets.kernel.use()
-        step.use_textures({**textures, **self._cells.textures})
+        step.use_textures(textures)
         count = self._workspace.capture.points(step.vertex_array(), ranges, output.buffer)
         if count > output.capacity:
             output.reserve(count)
@@ -293,7 +294,7 @@ class Frame:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "1"
         count = self._cells.across * self._cells.down
-        self._steps[name].draw(framebuffer, moderngl.TRIANGLES, 6 * count, {**textures, **self._cells.textures})
+        self._steps[name].draw(framebuffer, moderngl.TRIANGLES, 6 * count, textures)
 
     def _over_balls(self, name: str, framebuffer: moderngl.Framebuffer, flags: int, **textures: Texture) -> None:
         """Draw the rectangle of every ball."""

@@ -8,11 +8,10 @@ flat in vec2 v_density;
 
 void main() {
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
-    Chord chord = ball_chord(Ball(v_sphere.xyz, v_sphere.w), ray);
-    float half_chord_2 = chord_half_length_2(chord, v_density.y);
-    float front = (chord.middle - sqrt(max(half_chord_2, 0.0))) * depth_scale;
+    Chord chord = ball_chord(Ball(v_sphere.xyz, v_density.y), ray);
+    float front = (chord.middle - chord_half_length(chord)) * depth_scale;
     // Where the ray starts inside the kernel sphere it starts inside the fluid, which is another pass' matter.
-    if (half_chord_2 <= 0.0 || front < clip_start(ray) || front > clip_end(ray))
+    if (chord.peak <= 0.0 || front < clip_start(ray) || front > clip_end(ray))
         discard;
     gl_FragDepth = front;
 }

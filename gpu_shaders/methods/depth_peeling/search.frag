@@ -30,15 +30,17 @@ float exits[14];
 
 // A lone ball's surface is its kernel sphere ("single case"). As a share of the interval, or BEZIER_NO_ROOT.
 float lone_ball_root(uint id, float begin, float end, bool is_inside, Ray ray) {
-    Chord chord = ball_chord(ball_fetch(id), ray);
-    float half_chord_2 = chord_half_length_2(chord, ball_density(id).y);
-    float half_chord = sqrt(max(half_chord_2, 0.0));
+    float kernel_radius = ball_density(id).y;
+    if (kernel_radius <= 0.0)
+        return is_inside ? 0.0 : BEZIER_NO_ROOT;
+    Chord chord = ball_chord(Ball(ball_fetch(id).center, kernel_radius), ray);
+    float half_chord = chord_half_length(chord);
     float front = chord.middle - half_chord, back = chord.middle + half_chord;
     if (is_inside) {
-        float root = half_chord_2 > 0.0 ? max(back, begin) : begin;
+        float root = chord.peak > 0.0 ? max(back, begin) : begin;
         return root <= end ? (root - begin) / (end - begin) : BEZIER_NO_ROOT;
     }
-    bool meets = half_chord_2 > 0.0 && front <= end && back > begin;
+    bool meets = chord.peak > 0.0 && front <= end && back > begin;
     return meets ? (max(front, begin) - begin) / (end - begin) : BEZIER_NO_ROOT;
 }
 
@@ -71,8 +73,8 @@ State advance(State state, float next, float barrier, Ray ray) {
         Chord chord = ball_chord(ball_fetch(ids[i]), ray);
         exits[i] = (chord.middle + chord_half_length(chord)) * depth_scale;
     }
-    // Each round ends at an exit, the last at `next`.
-    for (int round = 0; round <= LIST_LENGTH; round++) {
+    // Each interval ends at an exit, the last at `next`.
+    for (int interval = 0; interval <= LIST_LENGTH; interval++) {
         uint leaving = state.count;
         float end = next;
         for (uint i = 0u; i < state.count; i++) {
