@@ -7,8 +7,6 @@ from dataclasses import replace
 import pytest
 from silence import check_silence
 
-import meniscus
-
 
 @pytest.fixture(scope="session", autouse=True)
 def opengl():
@@ -42,15 +40,3 @@ def another_context(monkeypatch):
     for opened in {first, context._shared}:
         opened.close()
         check_silence(opened)
-
-
-@pytest.fixture
-def depth_peeling_with_list_of(monkeypatch, opengl):
-    """Renders with depth peeling whose lists hold only so many balls."""
-    from meniscus.gpu_shaders.methods.depth_peeling import method
-
-    def render(length, scene, camera):
-        monkeypatch.setattr(method, "create", lambda: method.DepthPeeling(opengl, list_length=length))
-        return meniscus.render(scene.balls, camera, scene.field, method="depth_peeling")
-
-    return render

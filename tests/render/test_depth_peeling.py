@@ -85,6 +85,16 @@ def test_rays_whose_lists_are_too_short_arrive_all_the_same(scene_name, kernel, 
     judge(image, scene, camera)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("scene_name", ["ten_balls", "coincident_balls", "lattice_with_droplets", "eye_inside_fluid"])
+def test_lists_that_overflow_leave_the_image_exact(scene_name, depth_peeling):
+    scene = SCENES[scene_name]()
+    camera = scene.camera("perspective")
+    image = depth_peeling(scene, camera, list_length=2)
+    assert image.info.counts["overflows"] > 100
+    judge(image, scene, camera)
+
+
 def test_rays_that_walk_end_at_the_far_clip_distance(depth_peeling):
     scene = replace(SCENES["ten_balls"](), clip_end=3.6)
     camera = scene.camera("perspective")

@@ -29,16 +29,6 @@ def test_surface_matches_oracle(method, scene_name, projection):
     judge(image, scene, camera)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene_name", ["ten_balls", "coincident_balls", "lattice_with_droplets", "eye_inside_fluid"])
-def test_depth_peeling_is_exact_where_lists_overflow(scene_name, depth_peeling_with_list_of):
-    scene = SCENES[scene_name]()
-    camera = scene.camera("perspective")
-    image = depth_peeling_with_list_of(2, scene, camera)
-    assert image.info.counts["overflows"] > 100
-    judge(image, scene, camera)
-
-
 def test_overflow_is_counted_only_where_it_happens():
     scene = SCENES["long_lists"]()
     camera = scene.camera("perspective")
