@@ -27,8 +27,7 @@ class Capture:
     """Captures points on one context."""
 
     def __init__(self, context: GpuContext) -> None:
-        self._gl = context.gl
-        self._query = self._gl.query(primitives=True)
+        self._query = context.gl.query(primitives=True)
         function, unsigned, signed = context.function, ctypes.c_uint, ctypes.c_int
         self._enable, self._disable = function("glEnable", unsigned), function("glDisable", unsigned)
         self._bind_buffer = function("glBindBufferBase", unsigned, unsigned, unsigned)

@@ -21,33 +21,20 @@ class Limits:
         Width and height in pixels of what is drawn at once (1024).
     draw_buffers
         Render targets that a fragment shader writes at once (8).
-    texture_units
-        Textures that one stage reads (16).
-    geometry_output_vertices
-        Vertices that a geometry shader emits at most for each primitive (256).
-    geometry_output_components
-        Components of each of these vertices (128).
     """
 
     texture_size: int
     texture_buffer_size: int
     viewport_size: int
     draw_buffers: int
-    texture_units: int
-    geometry_output_vertices: int
-    geometry_output_components: int
 
     @classmethod
     def from_info(cls, info: Mapping[str, Any]) -> Limits:
         """The limits in what moderngl knows of a context (``Context.info``)."""
-        stages = ("GL_MAX_TEXTURE_IMAGE_UNITS", "GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS", "GL_MAX_GEOMETRY_TEXTURE_IMAGE_UNITS")
         return cls(
             texture_size=info["GL_MAX_TEXTURE_SIZE"],
             texture_buffer_size=info["GL_MAX_TEXTURE_BUFFER_SIZE"],
             viewport_size=min(info["GL_MAX_VIEWPORT_DIMS"]),
             # Every draw buffer needs an attachment.
             draw_buffers=min(info["GL_MAX_DRAW_BUFFERS"], info["GL_MAX_COLOR_ATTACHMENTS"]),
-            texture_units=min(info[stage] for stage in stages),
-            geometry_output_vertices=info["GL_MAX_GEOMETRY_OUTPUT_VERTICES"],
-            geometry_output_components=info["GL_MAX_GEOMETRY_OUTPUT_COMPONENTS"],
         )

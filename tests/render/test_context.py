@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import moderngl
@@ -31,9 +32,10 @@ def render():
 
 @pytest.fixture
 def debug_output(opengl):
-    """A driver that has debug output; macOS has none."""
+    """A driver that has debug output; macOS has none, but CI's has."""
     if opengl.version < 430 and "GL_KHR_debug" not in opengl.gl.extensions:
-        pytest.skip("this OpenGL has no debug output")
+        give_up = pytest.fail if os.environ.get("CI") else pytest.skip
+        give_up("this OpenGL has no debug output")
 
 
 def test_a_wrong_call_is_an_error_in_the_drivers_words_and_breaks_the_silence(opengl, debug_output):
@@ -95,8 +97,6 @@ def test_limits_are_those_of_the_driver_and_at_least_those_of_opengl_3_3(opengl)
     opengl.run(ask)
     assert opengl.limits.texture_size == integer.value >= 1024
     assert opengl.limits.draw_buffers >= 8
-    assert opengl.limits.texture_units >= 16
-    assert opengl.limits.geometry_output_vertices >= 256
 
 
 def test_too_few_render_targets_are_one_sentence(opengl, pretend_limits):

@@ -2,7 +2,7 @@
 
 from ....addon.render.method import MethodInfo
 
-# A crossing's number has 25 bits beside the list's length and state: one of two sides of each ball.
+# A crossing's number, 1 + the ball's, has 24 bits beside the list's length, the phase and the side; see state.glsl.
 MAX_BALLS = 2**24 - 1
 
 METHOD = MethodInfo(
