@@ -20,6 +20,8 @@ class RenderInfo:
     ----------
     method, backend, device
         What rendered it.
+    reason
+        Why this method and no other, in one sentence.
     milliseconds
         Wall time by stage, in order.
     counts
@@ -31,6 +33,7 @@ class RenderInfo:
     method: str = ""
     backend: str = ""
     device: str = ""
+    reason: str = ""
     milliseconds: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""How the surface is coloured in the Combined pass."""
+"""How the surface is coloured: in the viewport and in the Combined pass."""
 
 from __future__ import annotations
 
@@ -8,15 +8,76 @@ from .errors import InputError
 
 
 @dataclass(frozen=True)
-class Look:
-    """A plain headlight: light from the eye, no shadows.
+class LookStyle:
+    """A way to colour the surface.
 
     Attributes
     ----------
+    name, label, description
+        The identifier, and what the user interface shows.
+    passes
+        What it needs of the surface beside depth and normal, by pass name.
+    uses_thickness
+        Whether it needs the length of the way through the fluid.
+    uses_scene
+        Whether it shows what is behind the fluid.
+    """
+
+    name: str
+    label: str
+    description: str
+    passes: tuple[str, ...] = ()
+    uses_thickness: bool = False
+    uses_scene: bool = False
+
+
+LOOK_STYLES: dict[str, LookStyle] = {
+    style.name: style
+    for style in (
+        LookStyle("studio", "Studio", "Key, fill and rim light that turn with the view", ("color",)),
+        LookStyle(
+            "water",
+            "Water",
+            "Reflects a sky, bends what is behind it and takes light away by its thickness",
+            ("color",),
+            uses_thickness=True,
+            uses_scene=True,
+        ),
+        LookStyle("headlight", "Headlight", "Light from the eye, for measuring and for plain prints", ("color",)),
+        LookStyle("flat", "Flat", "The colour of the balls, without light", ("color",)),
+        LookStyle("normal", "Normal", "The direction of the surface as a colour, in world space"),
+        LookStyle("depth", "Depth", "Light where the surface is near, dark where it is far"),
+        LookStyle("speed", "Speed", "The speed of the balls as a colour map", ("velocity",)),
+        LookStyle("id", "ID", "A colour for each ball, which it keeps over time", ("ball_id",)),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour and light of the surface.
+
+    Attributes
+    ----------
+    style
+        A name from :data:`LOOK_STYLES`.
     color
         Linear Rec.709 surface colour, used where the balls have no colours of their own.
     ambient
-        Share of the light that does not depend on the angle, 0 to 1.
+        Share of the light that does not depend on the angle, 0 to 1 (studio, headlight).
+    roughness
+        0 is a mirror, 1 is dull (studio, water).
+    light
+        (3,) unit vector towards the key light, in view space: x to the right, y up, z to the eye (studio, water).
+    light_strength
+        Factor of all light (studio, water).
+    absorption
+        How strongly a Blender unit of fluid takes light away (water): the share ``exp(-absorption)`` of a colour channel
+        at 0 remains, a channel at 1 loses nothing.
+    ior
+        Index of refraction (water).
+    speed_range
+        Speeds at the two ends of the colour map, Blender units a second (speed); None for 0 and the fastest ball.
     depth_contrast
         How strongly what is in front is lightened and what is behind is darkened, where the two meet in the image. The light
         changes by the factor ``1 + tanh(depth_contrast * (G * D - D))`` with the depths D and the blur G of
@@ -31,8 +92,15 @@ class Look:
         A number of the depth contrast is unusable.
     """
 
+    style: str = "studio"
     color: tuple[float, float, float] = (0.06, 0.27, 0.6)
     ambient: float = 0.1
+    roughness: float = 0.2
+    light: tuple[float, float, float] = (-0.4, 0.6, 0.693)
+    light_strength: float = 1.0
+    absorption: float = 1.0
+    ior: float = 1.33
+    speed_range: tuple[float, float] | None = None
     depth_contrast: float = 0.0
     depth_contrast_radius: float = 0.04
 

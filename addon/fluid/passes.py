@@ -42,6 +42,7 @@ PASSES: dict[str, Pass] = {
         Pass("depth", "Depth", "Z", DEPTH_BACKGROUND, False, "Planar distance from the camera, Blender units"),
         Pass("normal", "Normal", "XYZ", 0.0, False, "Unit normal that points out of the fluid, world space"),
         Pass("position", "Position", "XYZ", 0.0, False, "Position of the surface, world space"),
+        Pass("color", "Color", "RGB", 0.0, True, "Blended colour of the balls, before any light"),
         Pass("velocity", "Velocity", "XYZ", 0.0, False, "Blended velocity of the balls, world space, Blender units a second"),
         Pass("ball_id", "Ball ID", "X", -1.0, False, "Id, else index, of the ball with the greatest share of the density"),
     )

@@ -26,7 +26,7 @@ Element = TypeVar("Element", np.float32, np.bool_)
 BACKENDS = ("auto", "gpu", "cpu")
 
 # What a pass needs beside depth and normal.
-_NEEDED: dict[str, Attribute] = {"combined": "color", "velocity": "velocity", "ball_id": "ball"}
+_NEEDED: dict[str, Attribute] = {"combined": "color", "color": "color", "velocity": "velocity", "ball_id": "ball"}
 
 
 def render(
@@ -155,6 +155,7 @@ class _Shot:
             "normal": lambda: surface.normal,
             "position": lambda: _positions(surface.depth, hit, camera),
             "combined": lambda: self._combined(surface, hit),
+            "color": lambda: _colors(surface, hit, self.look),
             "velocity": lambda: _velocities(surface),
             "ball_id": lambda: _ball_ids(surface, self.request.balls, hit),
         }
@@ -216,6 +217,13 @@ def _positions(depth: npt.NDArray[np.float32], hit: npt.NDArray[np.bool_], camer
     positions = np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
     positions[~hit] = 0
     return positions
+
+
+def _colors(surface: Surface, hit: npt.NDArray[np.bool_], look: Look) -> npt.NDArray[np.float32]:
+    """(height, width, 3) linear Rec.709; the look's colour where the balls have none, 0 where there is no hit."""
+    if surface.color is not None:
+        return surface.color
+    return hit[..., None] * np.array(look.color, np.float32)
 
 
 def _velocities(surface: Surface) -> npt.NDArray[np.float32]:
