@@ -22,7 +22,17 @@ from project import CACHE, ToolError, command_line, fingerprint, locked, output_
 from system_packages import apt_install, is_root_on_debian
 
 STAMP = "meniscus-stamp"
-PACKAGES = ["blender", "libegl1", "libgl1", "libgl1-mesa-dri", "mesa-vulkan-drivers", "python3-numpy", "xauth", "xdotool", "xvfb"]
+PACKAGES = [
+    "blender",
+    "libegl1",
+    "libgl1",
+    "libgl1-mesa-dri",
+    "mesa-vulkan-drivers",
+    "python3-numpy",
+    "xauth",
+    "xdotool",
+    "xvfb",
+]
 
 # Run under sh in a mount namespace of its own: $0 is the system's folder, the rest is the command.
 ENTER = 'mount --rbind /dev "$0/dev" && mount -t proc proc "$0/proc" && exec chroot "$0" "$@"'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,10 @@ class Balls:
 
     Attributes
     ----------
+    bounds
+        (2, 3) float64: the least and the greatest corner of the box around all influence spheres; zeros where there is none.
+    fastest
+        The greatest speed, Blender units a second; 0 where unknown.
     dropped
         How many balls were unusable and left out, by reason (``{"position is not finite": 3}``).
 
@@ -42,8 +47,6 @@ class Balls:
     InputError
         An array has the wrong shape or is not numeric.
     """
-
-    __slots__ = ("positions", "radii", "weights", "colors", "velocities", "ids", "dropped")
 
     def __init__(
         self,
@@ -83,6 +86,19 @@ class Balls:
     velocities: FloatArray | None
     ids: npt.NDArray[np.int32] | None
     dropped: dict[str, int]
+
+    @cached_property
+    def bounds(self) -> npt.NDArray[np.float64]:
+        if not len(self):
+            return np.zeros((2, 3))
+        radii = self.radii[:, None]
+        return np.array([(self.positions - radii).min(axis=0), (self.positions + radii).max(axis=0)], np.float64)
+
+    @cached_property
+    def fastest(self) -> float:
+        if self.velocities is None or not len(self):
+            return 0.0
+        return float(np.sqrt(np.max(np.einsum("ij,ij->i", self.velocities, self.velocities))))
 
     def __len__(self) -> int:
         return len(self.positions)

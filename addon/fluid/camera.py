@@ -185,6 +185,30 @@ class Camera:
         )
         return replace(self, window=window, width=region.width, height=region.height, region=None)
 
+    def resized(self, width: int, height: int) -> Camera:
+        """The same view in another number of pixels; this camera has no region."""
+        return replace(self, width=width, height=height)
+
+    def shifted(self, x: float, y: float) -> Camera:
+        """The same view with all rays moved by a part of a pixel, for antialiasing."""
+        pixel_width, pixel_height = self.pixel_size
+        left, bottom = x * pixel_width, y * pixel_height
+        window = Window(
+            self.window.left + left, self.window.right + left, self.window.bottom + bottom, self.window.top + bottom
+        )
+        return replace(self, window=window)
+
+    def is_same(self, other: Camera) -> bool:
+        """Whether both show the same in the same pixels."""
+        mine, theirs = ({**vars(camera), "world_from_view": None} for camera in (self, other))
+        return mine == theirs and np.array_equal(self.world_from_view, other.world_from_view)
+
+    def depth_range(self, bounds: FloatArray) -> tuple[float, float]:
+        """The least and the greatest planar depth in a box (2, 3) of world space; the nearest is not below 0."""
+        axis = -self.world_from_view[:3, 2]
+        reach = (bounds - self.eye) * axis
+        return max(float(reach.min(axis=0).sum()), 0.0), max(float(reach.max(axis=0).sum()), 0.0)
+
     def pixel_centers(self) -> tuple[FloatArray, FloatArray]:
         """Where the region's columns and rows of pixels lie in the window: (width,) and (height,)."""
         region, (pixel_width, pixel_height) = self.active_region, self.pixel_size

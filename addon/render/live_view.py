@@ -1,0 +1,310 @@
+"""Live images of a fluid: coarse while something changes, then at full resolution, then antialiased.
+
+One thread renders for all viewports, so that they do not compete for the processor. What each shows next is decided anew
+after every image: a view that has none yet comes first, and the newest view that was asked for is the only one that counts.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Condition, Thread
+
+import numpy as np
+
+from ..fluid.balls import Balls
+from ..fluid.camera import Camera
+from ..fluid.errors import CancelledError, MeniscusError
+from ..fluid.field import Field
+from ..fluid.image import ImageBuffers
+from .method import timed
+from .pace import Pace
+from .renderer import render
+
+SETTLE_SECONDS = 0.06
+"""How long a view must stay the same before it is refined: longer than from one image to the next while it moves."""
+
+_BYTES_PER_CHANNEL = 4
+
+Render = Callable[..., ImageBuffers]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What is to be seen.
+
+    Attributes
+    ----------
+    balls, camera, field
+        As for :func:`renderer.render`; the camera has the full resolution and no region.
+    passes
+        What is needed of the surface.
+    method, backend, threads
+        As for :func:`renderer.render`.
+    samples
+        How many samples a pixel gets at last, 1 for no antialiasing.
+    frame_rate
+        Images a second to hold while views change.
+    memory_limit
+        Bytes that the samples may take together; there is always one.
+    """
+
+    balls: Balls
+    camera: Camera
+    field: Field
+    passes: tuple[str, ...] = ("depth", "normal")
+    method: str = "auto"
+    backend: str = "auto"
+    threads: int = 0
+    samples: int = 8
+    frame_rate: float = 24.0
+    memory_limit: int = 512 << 20
+
+    def shows_the_same(self, other: View | None) -> bool:
+        """Whether images of the other view are images of this one."""
+        return (
+            other is not None
+            and self.balls is other.balls
+            and self.camera.is_same(other.camera)
+            and (self.field, self.passes, self.method, self.backend) == (other.field, other.passes, other.method, other.backend)
+        )
+
+    @property
+    def most_pictures(self) -> int:
+        """How many samples fit into the memory."""
+        scalars = {"depth": 1, "ball_id": 1}
+        channels = sum(scalars.get(name, 3) for name in self.passes)
+        each = self.camera.width * self.camera.height * channels * _BYTES_PER_CHANNEL
+        return max(1, min(self.samples, self.memory_limit // each))
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An image of a view.
+
+    Attributes
+    ----------
+    image
+        Depth, normal and what else the view asks for; its camera has the size of the image.
+    view
+        What it shows.
+    depth_range
+        The least and the greatest planar depth at which there can be fluid, Blender units.
+    speed_range
+        0 and the speed of the fastest ball, Blender units a second.
+    """
+
+    image: ImageBuffers
+    view: View
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        return self.image.camera.depth_range(self.view.balls.bounds)
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        return 0.0, self.view.balls.fastest
+
+
+class LiveView:
+    """What one viewport shows. Made by :meth:`LiveRenderer.open`; methods may be called from any thread.
+
+    Attributes
+    ----------
+    revision
+        A number that changes whenever there is something new to draw.
+    """
+
+    def __init__(self, changed: Condition) -> None:
+        self._changed = changed
+        self._pace = Pace()
+        self._view: View | None = None
+        self._asked_at = 0.0
+        self._pictures: list[Picture] = []
+        self._failure: BaseException | None = None
+        self.revision = 0
+
+    def show(self, view: View) -> None:
+        """Ask for images of a view; what was asked for before is given up."""
+        with self._changed:
+            if view.shows_the_same(self._view):
+                self._view = view
+            else:
+                self._view, self._failure, self._asked_at = view, None, time.monotonic()
+            self._changed.notify_all()
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until there is a picture of the view that was asked for last, or a failure; whether that came in time."""
+        with self._changed:
+            return self._changed.wait_for(self._is_answered, seconds)
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """The newest samples, all of one view and one size; the first looks through the centres of the pixels."""
+        with self._changed:
+            return list(self._pictures)
+
+    @property
+    def failure(self) -> tuple[str, str] | None:
+        """What went wrong with the view that was asked for: a sentence, and the traceback of what nobody expected."""
+        with self._changed:
+            failure = self._failure
+        if failure is None:
+            return None
+        if isinstance(failure, MeniscusError):
+            return str(failure), ""
+        return f"Meniscus failed unexpectedly ({failure}): please report it", "".join(traceback.format_exception(failure))
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nothing more will come unless another view is asked for."""
+        with self._changed:
+            return self._stage() is None
+
+    def _is_current(self) -> bool:
+        return bool(self._pictures) and self._view is not None and self._view.shows_the_same(self._pictures[0].view)
+
+    def _is_answered(self) -> bool:
+        return self._failure is not None or self._is_current()
+
+    def _stage(self) -> int | None:
+        """How far the view is: 0 without a picture, 1 with a coarse one, then the number of samples plus 1; None: finished."""
+        if self._view is None or self._failure is not None:
+            return None
+        if not self._is_current():
+            return 0
+        if self._pictures[0].image.camera.width < self._view.camera.width:
+            return 1
+        return len(self._pictures) + 1 if len(self._pictures) < self._view.most_pictures else None
+
+    def _due(self) -> float:
+        """When the next picture should be begun, by the monotonic clock."""
+        return self._asked_at if self._stage() == 0 else self._asked_at + SETTLE_SECONDS
+
+    def _next_camera(self) -> Camera:
+        """What the next picture looks through."""
+        assert self._view is not None
+        camera = self._view.camera
+        if self._stage() == 0:
+            return camera.resized(*self._pace.size(camera.width, camera.height, 1.0 / self._view.frame_rate))
+        return camera.shifted(*_offset(len(self._pictures) if self._stage() != 1 else 0))
+
+    def _accept(self, picture: Picture, seconds: float) -> None:
+        camera = picture.image.camera
+        self._pace.note(camera.width * camera.height, seconds)
+        is_next = self._is_current() and camera.width == self._pictures[0].image.camera.width
+        self._pictures = [*self._pictures, picture] if is_next else [picture]
+        self.revision += 1
+
+    def _fail(self, failure: BaseException) -> None:
+        self._failure = failure
+        self.revision += 1
+
+
+class LiveRenderer:
+    """The thread that renders for all live views.
+
+    Parameters
+    ----------
+    render
+        What makes an image, as :func:`renderer.render`.
+    """
+
+    def __init__(self, render: Render = render) -> None:
+        self._render = render
+        self._changed = Condition()
+        self._views: list[LiveView] = []
+        self._is_closed = False
+        self._thread = Thread(target=self._work, name="meniscus-live", daemon=True)
+        self._thread.start()
+
+    def open(self) -> LiveView:
+        """A new live view."""
+        with self._changed:
+            self._views.append(LiveView(self._changed))
+            return self._views[-1]
+
+    def drop(self, live: LiveView) -> None:
+        """Render no more for a live view."""
+        with self._changed:
+            self._views.remove(live)
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """End the thread, and wait for it."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                live = self._next()
+                if live is None:
+                    return
+                view, camera, stage = live._view, live._next_camera(), live._stage()
+            assert view is not None
+            self._make_picture(live, view, camera, is_first=stage == 0)
+
+    def _next(self) -> LiveView | None:
+        """The live view whose turn it is, once there is one; None when the thread is to end."""
+        while not self._is_closed:
+            pending = [live for live in self._views if live._stage() is not None]
+            now = time.monotonic()
+            due = [live for live in pending if live._due() <= now]
+            if due:
+                return min(due, key=lambda live: (live._stage(), live._asked_at))
+            self._changed.wait(min(live._due() for live in pending) - now if pending else None)
+        return None
+
+    def _make_picture(self, live: LiveView, view: View, camera: Camera, is_first: bool) -> None:
+        # A first picture is finished whatever comes: else a viewport that changes all the time would show nothing.
+        is_cancelled = (lambda: self._is_closed) if is_first else lambda: self._is_overtaken(live, view)
+        milliseconds: dict[str, float] = {}
+        try:
+            with timed(milliseconds, "picture"):
+                image = self._render(
+                    view.balls,
+                    camera,
+                    view.field,
+                    method=view.method,
+                    backend=view.backend,
+                    passes=view.passes,
+                    is_cancelled=is_cancelled,
+                    threads=view.threads,
+                )
+        except CancelledError:
+            return
+        except Exception as failure:  # noqa: BLE001 - whatever it is, the user sees it and the thread goes on
+            with self._changed:
+                if view.shows_the_same(live._view):
+                    live._fail(failure)
+                    self._changed.notify_all()
+            return
+        with self._changed:
+            if is_first or view.shows_the_same(live._view):
+                live._accept(Picture(image, view), milliseconds["picture"] / 1e3)
+                self._changed.notify_all()
+
+    def _is_overtaken(self, live: LiveView, view: View) -> bool:
+        """Whether something more urgent waits than to refine this view."""
+        with self._changed:
+            return (
+                self._is_closed
+                or live not in self._views
+                or not view.shows_the_same(live._view)
+                or any(other._stage() == 0 for other in self._views)
+            )
+
+
+def _offset(sample: int) -> tuple[float, float]:
+    """Where a sample lies in its pixel, -0.5 to 0.5 from the centre; sample 0 at the centre.
+
+    The additive recurrence with the plastic number: any first samples are spread evenly.
+    """
+    plastic = 1.32471795724474602596
+    offsets = (np.array([1 / plastic, 1 / plastic**2]) * sample + 0.5) % 1.0 - 0.5
+    return float(offsets[0]), float(offsets[1])
