@@ -12,8 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Condition, Thread
 
-import numpy as np
-
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, MeniscusError
@@ -303,8 +301,16 @@ class LiveRenderer:
 def _offset(sample: int) -> tuple[float, float]:
     """Where a sample lies in its pixel, -0.5 to 0.5 from the centre; sample 0 at the centre.
 
-    The additive recurrence with the plastic number: any first samples are spread evenly.
+    Halton's sequence: any first samples are spread evenly, and their mean is nearer to the centre than one sample counts.
     """
-    plastic = 1.32471795724474602596
-    offsets = (np.array([1 / plastic, 1 / plastic**2]) * sample + 0.5) % 1.0 - 0.5
-    return float(offsets[0]), float(offsets[1])
+    return (_mirrored(sample, 2) + 0.5) % 1.0 - 0.5, (_mirrored(sample, 3) + 0.5) % 1.0 - 0.5
+
+
+def _mirrored(number: int, base: int) -> float:
+    """The digits of a number mirrored at the point (van der Corput)."""
+    value, unit = 0.0, 1.0
+    while number:
+        unit /= base
+        number, digit = divmod(number, base)
+        value += digit * unit
+    return value
