@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..fluid.camera import Camera, Region, Window
+from ..fluid.camera import Camera, Region
 from ..fluid.errors import InputError
+from .view_camera import window_of
 
 _LARGEST_SHEAR = 1e-3
 """Greatest cosine between two axes of a camera that still counts as a rotation."""
@@ -45,7 +46,7 @@ def read_camera(
     projection = camera.calc_matrix_camera(depsgraph, x=width, y=height, scale_x=aspect_x, scale_y=aspect_y)
     whole = Camera(
         world_from_view=_world_from_view(camera),
-        window=_window(np.array(projection), camera.data.type == "PERSP"),
+        window=window_of(np.array(projection), camera.data.type == "PERSP"),
         is_perspective=camera.data.type == "PERSP",
         width=width,
         height=height,
@@ -88,18 +89,6 @@ def _world_from_view(camera: bpy.types.Object) -> np.ndarray:
     left, _, right = np.linalg.svd(axes)
     transform[:3, :3] = left @ right
     return transform
-
-
-def _window(projection: np.ndarray, is_perspective: bool) -> Window:
-    """What an OpenGL projection (4, 4) shows."""
-    size_x, size_y = 2 / projection[0, 0], 2 / projection[1, 1]
-    middle = projection[:2, 2] if is_perspective else -projection[:2, 3]
-    return Window(
-        size_x * (middle[0] - 1) / 2,
-        size_x * (middle[0] + 1) / 2,
-        size_y * (middle[1] - 1) / 2,
-        size_y * (middle[1] + 1) / 2,
-    )
 
 
 def _border(render: bpy.types.RenderSettings, width: int, height: int) -> Region:

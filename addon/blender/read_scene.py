@@ -19,7 +19,9 @@ from .read_points import read_points
 from .visible_sources import Source, settings_of, visible_sources
 
 
-def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Balls:
+def read_balls(
+    depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space: bpy.types.SpaceView3D | None = None
+) -> Balls:
     """All balls of a scene at its current frame, in world space.
 
     Parameters
@@ -28,6 +30,8 @@ def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Bal
         Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
     viewport
         Whether to read what the viewport shows rather than what a render shows.
+    space
+        The viewport whose local view counts; None for none.
 
     Returns
     -------
@@ -37,11 +41,13 @@ def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False) -> Bal
 
     Raises
     ------
+    NoSourceError
+        No object is used as fluid.
     InputError
-        No object is used as fluid, or one lacks what its settings ask for.
+        One lacks what its settings ask for.
     """
     parts: list[BallPart] = []
-    for source in visible_sources(depsgraph, viewport):
+    for source in visible_sources(depsgraph, viewport, space):
         parts.extend(_parts_of(source, depsgraph, viewport))
     return _joined([part for part in parts if len(part)], tuple(settings_of(depsgraph.scene_eval, depsgraph).color))
 

@@ -12,6 +12,10 @@ import numpy.typing as npt
 from ..fluid.errors import InputError
 
 
+class NoSourceError(InputError):
+    """No object of the scene is used as fluid."""
+
+
 def settings_of(owner: bpy.types.ID, depsgraph: bpy.types.Depsgraph) -> bpy.types.PropertyGroup:
     """The ``meniscus`` properties of an object or a scene that `depsgraph` evaluated, at its current frame.
 
@@ -62,7 +66,9 @@ ShownTest = Callable[[Source, bpy.types.Object], bool]
 """Says whether a source is visible, given the object of the view layer that puts it where it is."""
 
 
-def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[Source]:
+def visible_sources(
+    depsgraph: bpy.types.Depsgraph, viewport: bool, space: bpy.types.SpaceView3D | None = None
+) -> Iterator[Source]:
     """The fluid objects that are visible, at each place where they stand, instances too.
 
     Parameters
@@ -71,25 +77,29 @@ def visible_sources(depsgraph: bpy.types.Depsgraph, viewport: bool) -> Iterator[
         Evaluated dependency graph.
     viewport
         Whether visibility in the viewport counts rather than visibility in renders.
+    space
+        The viewport whose local view counts; None for none.
 
     Raises
     ------
+    NoSourceError
+        No object is used as fluid.
     InputError
-        No object is used as fluid, or a render shows one that the viewport's dependency graph does not hold.
+        A render shows one that the viewport's dependency graph does not hold.
     """
     evaluated = (item for item in depsgraph.ids if isinstance(item, bpy.types.Object))
     fluid = {item.as_pointer() for item in evaluated if settings_of(item, depsgraph).use_fluid}
     if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
-        raise InputError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
-    is_shown = _shown_in_viewport(depsgraph) if viewport else _shown_in_render(depsgraph)
+        raise NoSourceError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
+    is_shown = _shown_in_viewport(depsgraph, space) if viewport else _shown_in_render(depsgraph)
     for source, owner in _places(depsgraph, fluid):
         if is_shown(source, owner):
             yield source
 
 
-def _shown_in_viewport(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+def _shown_in_viewport(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None) -> ShownTest:
     # The dependency graph also holds the objects of hidden collections, because a viewport may have its own choice of them.
-    return lambda source, owner: owner.original.visible_get(view_layer=depsgraph.view_layer)
+    return lambda source, owner: owner.original.visible_get(view_layer=depsgraph.view_layer, viewport=space)
 
 
 def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:

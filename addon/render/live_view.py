@@ -138,6 +138,11 @@ class LiveView:
         with self._changed:
             return self._changed.wait_for(self._is_answered, seconds)
 
+    def wait_until_rest(self, seconds: float) -> bool:
+        """Wait until nothing more will come; whether that was in time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._stage() is None, seconds)
+
     @property
     def pictures(self) -> list[Picture]:
         """The newest samples, all of one view and one size; the first looks through the centres of the pixels."""

@@ -68,10 +68,8 @@ def renderer(fake):
     renderer.close()
 
 
-def rest(live, seconds=SOON):
-    """Wait until nothing more will come."""
-    with live._changed:
-        assert live._changed.wait_for(lambda: live._stage() is None, seconds)
+def rest(live):
+    assert live.wait_until_rest(SOON)
 
 
 def test_a_view_is_refined_and_then_antialiased(renderer, fake):

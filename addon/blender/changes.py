@@ -1,0 +1,93 @@
+"""What has changed since the balls were read: Blender tells of changes through handlers and property updates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+_OBJECTS_WITHOUT_BALLS = {"CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER", "ARMATURE", "LATTICE"}
+"""Types of objects that supply no balls; where one moves something that does, Blender tells of that too."""
+
+
+class Changes:
+    """Counts the changes that may alter what the fluid is or how it is drawn.
+
+    Attributes
+    ----------
+    revision
+        Grows with each.
+    may_have_sources
+        False where no object supplied balls when last looked, and none has come since.
+    """
+
+    def __init__(self) -> None:
+        self.revision = 0
+        self.may_have_sources = True
+
+    def note(self) -> None:
+        """Something has changed, what is not known."""
+        self.revision += 1
+        self.may_have_sources = True
+
+
+CHANGES = Changes()
+"""Of all scenes."""
+
+
+def note_setting(_owner: Any, _context: bpy.types.Context) -> None:
+    """To be called by Blender when a property of ours is set by hand or by a script."""
+    CHANGES.note()
+
+
+@persistent
+def _note_frame(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph) -> None:
+    CHANGES.revision += 1
+
+
+@persistent
+def _note_all(*_: object) -> None:
+    CHANGES.note()
+
+
+@persistent
+def _note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    for update in depsgraph.updates:
+        item = update.id
+        if isinstance(item, bpy.types.Object):
+            if item.type not in _OBJECTS_WITHOUT_BALLS:
+                CHANGES.revision += 1
+                CHANGES.may_have_sources |= item.original.meniscus.use_fluid
+        elif isinstance(item, _IDS_WITH_BALLS):
+            CHANGES.revision += 1
+
+
+_IDS_WITH_BALLS = (
+    bpy.types.Scene,
+    bpy.types.Collection,
+    bpy.types.Mesh,
+    bpy.types.Curve,
+    bpy.types.PointCloud,
+    bpy.types.ParticleSettings,
+    bpy.types.GeometryNodeTree,
+)
+_HANDLERS = {
+    "frame_change_post": _note_frame,
+    "depsgraph_update_post": _note_updates,
+    "undo_post": _note_all,
+    "redo_post": _note_all,
+    "load_post": _note_all,
+}
+
+
+def register() -> None:
+    """Listen to Blender."""
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    """Listen no more."""
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)

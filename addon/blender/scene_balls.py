@@ -1,0 +1,98 @@
+"""The balls that a viewport shows, read again only when something has changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..fluid.balls import Balls
+from .changes import Changes
+from .read_scene import read_balls
+from .visible_sources import NoSourceError
+
+_ARRAYS = ("positions", "radii", "weights", "colors", "velocities", "ids")
+
+Key = tuple[int, str, int]
+"""Address of the scene, name of the view layer, and address of a viewport that shows its own choice of objects, else 0."""
+
+
+@dataclass
+class _Entry:
+    revision: int
+    balls: Balls | None
+
+
+class SceneBalls:
+    """Balls by scene, view layer and local view.
+
+    Parameters
+    ----------
+    changes
+        Tells when to read again.
+
+    Attributes
+    ----------
+    reads
+        How often a scene was read.
+    """
+
+    def __init__(self, changes: Changes) -> None:
+        self._changes = changes
+        self._entries: dict[Key, _Entry] = {}
+        self.reads = 0
+
+    def balls(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Balls | None:
+        """What a viewport shows; the same object as before where it is the same. None where no object supplies balls.
+
+        Raises
+        ------
+        InputError
+            A source lacks what its settings ask for.
+        """
+        if not self._changes.may_have_sources:
+            return None
+        key = _key(depsgraph, space)
+        entry = self._entries.get(key)
+        if entry is None or entry.revision != self._changes.revision:
+            balls = self._read(depsgraph, space)
+            if entry is not None and _is_same(balls, entry.balls):
+                balls = entry.balls
+            self._entries[key] = entry = _Entry(self._changes.revision, balls)
+        return entry.balls
+
+    def _read(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Balls | None:
+        self.reads += 1
+        try:
+            return read_balls(depsgraph, viewport=True, space=space)
+        except NoSourceError:
+            self._changes.may_have_sources = _any_source()
+            return None
+
+    def forget(self) -> None:
+        """Drop all, because the file is another."""
+        self._entries.clear()
+
+
+def _key(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Key:
+    has_own_choice = space.local_view is not None or space.use_local_collections
+    return (
+        depsgraph.scene.original.as_pointer(),
+        depsgraph.view_layer.name,
+        space.as_pointer() if has_own_choice else 0,
+    )
+
+
+def _any_source() -> bool:
+    """In any scene: what is known of one must not hide another's."""
+    return any(item.meniscus.use_fluid for item in bpy.data.objects)
+
+
+def _is_same(balls: Balls | None, other: Balls | None) -> bool:
+    if balls is None or other is None:
+        return balls is other
+    pairs = ((getattr(balls, name), getattr(other, name)) for name in _ARRAYS)
+    return balls.dropped == other.dropped and all(
+        mine is theirs if mine is None or theirs is None else np.array_equal(mine, theirs) for mine, theirs in pairs
+    )

@@ -1,0 +1,240 @@
+"""Draws the fluid in the 3D viewports.
+
+Blender calls the handler whenever it draws a viewport. The handler reads the scene if it has changed, asks a live view for
+images, waits a moment for the first one of what is seen now, so that the fluid does not lag behind the meshes, and draws the
+newest. A timer has viewports redrawn while finer images come.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+import gpu
+from bpy.app.handlers import persistent
+
+from ..fluid.balls import Balls
+from ..fluid.errors import MeniscusError
+from ..fluid.look import LOOK_STYLES, Look
+from ..render.live_view import LiveRenderer, LiveView, View
+from .changes import CHANGES
+from .preferences import preferences
+from .presenter import Presenter, PresentView
+from .read_scene import read_field, read_look
+from .scene_balls import SceneBalls
+from .view_camera import ViewCamera, view_camera
+from .viewport_status import STATUS
+
+LONGEST_WAIT = 0.045
+"""Seconds that the handler may take for reading and for waiting together."""
+
+_TICK = 0.01
+_STILL_WAIT = 60.0
+"""Seconds that a viewport render, which is drawn once, waits for the whole image."""
+
+
+@dataclass
+class _Viewport:
+    """What is kept for a viewport.
+
+    `drawn` is the revision of the live view that was drawn last.
+    """
+
+    live: LiveView
+    presenter: Presenter = field(default_factory=Presenter)
+    drawn: int = -1
+
+
+@dataclass(frozen=True)
+class _Pause:
+    """Nothing is drawn until something changes, because drawing failed."""
+
+    revision: int
+    look: Look
+
+
+class ViewportDrawing:
+    """The fluid in all 3D viewports of Blender."""
+
+    def __init__(self) -> None:
+        self._renderer = LiveRenderer()
+        self._scene_balls = SceneBalls(CHANGES)
+        self._viewports: dict[int, _Viewport] = {}
+        self._dropped: list[_Viewport] = []
+        self._pause: _Pause | None = None
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
+
+    def close(self) -> None:
+        """Draw no more, and release everything."""
+        bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        if bpy.app.timers.is_registered(self._tick):
+            bpy.app.timers.unregister(self._tick)
+        self._renderer.close()
+        self.forget()
+        self._release_dropped()
+
+    def forget(self) -> None:
+        """Drop what belongs to the file that was open."""
+        for key in list(self._viewports):
+            self._drop(key)
+        self._scene_balls.forget()
+        self._pause = None
+        STATUS.clear()
+
+    def _draw(self) -> None:
+        """Blender's draw handler. Nothing may leave it: Blender would print it at every redraw."""
+        started = time.monotonic()
+        context = bpy.context
+        self._release_dropped()
+        if not CHANGES.may_have_sources or not context.scene.meniscus.use_viewport:
+            return
+        look = read_look(context.scene)
+        if self._pause is not None:
+            if self._pause == _Pause(CHANGES.revision, look):
+                return
+            self._pause = None
+        try:
+            self._draw_fluid(context, look, started)
+        except MeniscusError as error:
+            self._stop(look, str(error), "")
+        except Exception as error:  # noqa: BLE001 - whatever it is, the user sees it once and Blender goes on
+            self._stop(look, f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
+
+    def _stop(self, look: Look, problem: str, details: str) -> None:
+        self._pause = _Pause(CHANGES.revision, look)
+        STATUS.report(problem, details)
+
+    def _draw_fluid(self, context: bpy.types.Context, look: Look, started: float) -> None:
+        balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
+        if balls is None:
+            return
+        seen = _seen(balls)
+        view = _view(context.scene, balls, seen, look)
+        viewport = self._viewport(context.region, seen)
+        viewport.live.show(view)
+        is_window = _is_window(context.region, seen)
+        if is_window:
+            viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
+        else:
+            viewport.live.wait_until_rest(_STILL_WAIT)
+        self._present(viewport, look, seen)
+        self._report(viewport, balls)
+        if is_window and not bpy.app.timers.is_registered(self._tick):
+            bpy.app.timers.register(self._tick, first_interval=_TICK)
+
+    def _viewport(self, region: bpy.types.Region, seen: ViewCamera) -> _Viewport:
+        # What is drawn into an image of another size, a viewport render, does not disturb the viewport itself.
+        key = region.as_pointer() if _is_window(region, seen) else 0
+        if key not in self._viewports:
+            self._viewports[key] = _Viewport(self._renderer.open())
+        return self._viewports[key]
+
+    def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera) -> None:
+        viewport.drawn = viewport.live.revision
+        pictures = viewport.live.pictures
+        if pictures:
+            offset = seen.offset_of(pictures[0].image.camera)
+            viewport.presenter.draw(pictures, look, PresentView(seen.projection, offset))
+
+    def _report(self, viewport: _Viewport, balls: Balls) -> None:
+        pictures = viewport.live.pictures
+        if pictures:
+            STATUS.show(pictures[0].image.info, balls.dropped_text)
+        STATUS.report(*(viewport.live.failure or ("", "")))
+
+    def _tick(self) -> float | None:
+        """Have those viewports redrawn for which there is something new; seconds until the next look, None for no more."""
+        regions = {region.as_pointer(): (region, area) for region, area in _view_regions()}
+        for key in self._viewports.keys() - regions.keys():
+            self._drop(key)
+        is_busy = STATUS.has_news
+        for key, viewport in self._viewports.items():
+            region, area = regions[key]
+            if viewport.drawn != viewport.live.revision:
+                region.tag_redraw()
+            is_resting = viewport.live.is_at_rest and viewport.drawn == viewport.live.revision
+            is_busy |= not is_resting
+            if STATUS.has_news:
+                _redraw_sidebar(area)
+        STATUS.has_news = False
+        return _TICK if is_busy else None
+
+    def _drop(self, key: int) -> None:
+        viewport = self._viewports.pop(key)
+        self._renderer.drop(viewport.live)
+        self._dropped.append(viewport)
+
+    def _release_dropped(self) -> None:
+        """Textures are released where Blender's graphics context is surely active: in a handler."""
+        while self._dropped:
+            self._dropped.pop().presenter.release()
+
+
+def _seen(balls: Balls) -> ViewCamera:
+    """The view that Blender is drawing, in the size in which it draws it."""
+    _, _, width, height = gpu.state.viewport_get()
+    return view_camera(gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix(), width, height, balls.bounds)
+
+
+def _is_window(region: bpy.types.Region, seen: ViewCamera) -> bool:
+    """Whether Blender draws the viewport in its window, not into an image."""
+    return (seen.camera.width, seen.camera.height) == (region.width, region.height)
+
+
+def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
+    settings, chosen = scene.meniscus, preferences()
+    wanted = [name for name in LOOK_STYLES[look.style].passes if name != "color" or balls.colors is not None]
+    return View(
+        balls,
+        seen.camera,
+        read_field(scene),
+        passes=("depth", "normal", *wanted),
+        method=settings.method,
+        backend=chosen.backend if settings.backend == "auto" else settings.backend,
+        threads=chosen.threads,
+        samples=settings.preview_samples,
+        frame_rate=settings.preview_frame_rate,
+        memory_limit=chosen.memory_limit << 20,
+    )
+
+
+def _view_regions() -> Iterator[tuple[bpy.types.Region, bpy.types.Area]]:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                yield from ((region, area) for region in area.regions if region.type == "WINDOW")
+
+
+def _redraw_sidebar(area: bpy.types.Area) -> None:
+    for region in area.regions:
+        if region.type == "UI":
+            region.tag_redraw()
+
+
+_drawing: ViewportDrawing | None = None
+
+
+@persistent
+def _forget(*_: object) -> None:
+    if _drawing is not None:
+        _drawing.forget()
+
+
+def register() -> None:
+    """Draw the fluid from now on, where Blender has windows."""
+    global _drawing
+    if not bpy.app.background:
+        _drawing = ViewportDrawing()
+        bpy.app.handlers.load_pre.append(_forget)
+
+
+def unregister() -> None:
+    """Draw it no more."""
+    global _drawing
+    if _drawing is not None:
+        bpy.app.handlers.load_pre.remove(_forget)
+        _drawing.close()
+        _drawing = None
