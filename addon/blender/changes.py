@@ -39,6 +39,10 @@ CHANGES = Changes()
 def note_setting(_owner: Any, _context: bpy.types.Context) -> None:
     """To be called by Blender when a property of ours is set by hand or by a script."""
     CHANGES.note()
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 @persistent

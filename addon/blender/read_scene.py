@@ -19,9 +19,7 @@ from .read_points import read_points
 from .visible_sources import Source, settings_of, visible_sources
 
 
-def read_balls(
-    depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space: bpy.types.SpaceView3D | None = None
-) -> Balls:
+def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space: bpy.types.SpaceView3D | None = None) -> Balls:
     """All balls of a scene at its current frame, in world space.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +20,8 @@ class ViewCamera:
     Attributes
     ----------
     camera
-        Of the whole viewport. In an orthographic view its eye is moved forward to where the fluid begins: Blender's lies as far
-        from it as the view reaches, and depths would lose their digits.
+        Of the whole viewport; its region is the part in which there may be fluid. In an orthographic view its eye is moved
+        forward to where the fluid begins: Blender's lies as far from it as the view reaches, and depths would lose digits.
     depth_offset
         How far the eye was moved: planar depths from Blender's eye are this much greater.
     projection
@@ -32,6 +32,17 @@ class ViewCamera:
     depth_offset: float
     projection: FloatArray
 
+    def rectangle_of(self, window: Window) -> tuple[float, float, float, float]:
+        """Where in the viewport a window lies: left, bottom, right, top in normalized device coordinates."""
+        whole = self.camera.window
+        x, y = 2 / (whole.right - whole.left), 2 / (whole.top - whole.bottom)
+        return (
+            (window.left - whole.left) * x - 1,
+            (window.bottom - whole.bottom) * y - 1,
+            (window.right - whole.left) * x - 1,
+            (window.top - whole.bottom) * y - 1,
+        )
+
     def offset_of(self, camera: Camera) -> float:
         """What to add to the planar depths of an earlier camera that looked the same way."""
         return self.depth_offset + float((self.camera.eye - camera.eye) @ camera.world_from_view[:3, 2])
@@ -39,8 +50,8 @@ class ViewCamera:
 
 def view_camera(
     view_from_world: npt.ArrayLike, projection: npt.ArrayLike, width: int, height: int, bounds: FloatArray
-) -> ViewCamera:
-    """The camera of a view.
+) -> ViewCamera | None:
+    """The camera of a view; None where no fluid can be in it.
 
     Parameters
     ----------
@@ -56,6 +67,14 @@ def view_camera(
     InputError
         The matrices are not those of a perspective or an orthographic view.
     """
+    seen = _whole_view(view_from_world, projection, width, height, bounds)
+    region = seen.camera.region_of(bounds)
+    return None if region is None else replace(seen, camera=replace(seen.camera, region=region))
+
+
+def _whole_view(
+    view_from_world: npt.ArrayLike, projection: npt.ArrayLike, width: int, height: int, bounds: FloatArray
+) -> ViewCamera:
     matrix = np.asarray(projection, np.float64)
     world_from_view = rigid(np.linalg.inv(np.asarray(view_from_world, np.float64)))
     if matrix[3, 3] == 0:

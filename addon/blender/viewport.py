@@ -20,6 +20,7 @@ from ..fluid.balls import Balls
 from ..fluid.errors import MeniscusError
 from ..fluid.look import LOOK_STYLES, Look
 from ..render.live_view import LiveRenderer, LiveView, View
+from ..render.method import timed
 from .changes import CHANGES
 from .preferences import preferences
 from .presenter import Presenter, PresentView
@@ -112,6 +113,8 @@ class ViewportDrawing:
         if balls is None:
             return
         seen = _seen(balls)
+        if seen is None:
+            return
         view = _view(context.scene, balls, seen, look)
         viewport = self._viewport(context.region, seen)
         viewport.live.show(view)
@@ -133,11 +136,17 @@ class ViewportDrawing:
         return self._viewports[key]
 
     def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera) -> None:
+        is_new = viewport.drawn != viewport.live.revision
         viewport.drawn = viewport.live.revision
         pictures = viewport.live.pictures
         if pictures:
-            offset = seen.offset_of(pictures[0].image.camera)
-            viewport.presenter.draw(pictures, look, PresentView(seen.projection, offset))
+            milliseconds: dict[str, float] = {}
+            shown = pictures[0].view.camera
+            place = PresentView(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window))
+            with timed(milliseconds, "present"):
+                viewport.presenter.draw(pictures, look, place)
+            if is_new:
+                viewport.live.note_presenting(pictures[-1], milliseconds["present"] / 1e3)
 
     def _report(self, viewport: _Viewport, balls: Balls) -> None:
         pictures = viewport.live.pictures
@@ -173,8 +182,8 @@ class ViewportDrawing:
             self._dropped.pop().presenter.release()
 
 
-def _seen(balls: Balls) -> ViewCamera:
-    """The view that Blender is drawing, in the size in which it draws it."""
+def _seen(balls: Balls) -> ViewCamera | None:
+    """The view that Blender is drawing, in the size in which it draws it; None where no ball is in it."""
     _, _, width, height = gpu.state.viewport_get()
     return view_camera(gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix(), width, height, balls.bounds)
 
@@ -189,7 +198,7 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
     wanted = [name for name in LOOK_STYLES[look.style].passes if name != "color" or balls.colors is not None]
     return View(
         balls,
-        seen.camera,
+        seen.camera.cropped(),
         read_field(scene),
         passes=("depth", "normal", *wanted),
         method=settings.method,

@@ -90,7 +90,9 @@ def visible_sources(
     evaluated = (item for item in depsgraph.ids if isinstance(item, bpy.types.Object))
     fluid = {item.as_pointer() for item in evaluated if settings_of(item, depsgraph).use_fluid}
     if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
-        raise NoSourceError("No object supplies balls: enable Meniscus in the object properties of one with particles or points")
+        raise NoSourceError(
+            "No object supplies balls: enable Meniscus in the object properties of one with particles or points"
+        )
     is_shown = _shown_in_viewport(depsgraph, space) if viewport else _shown_in_render(depsgraph)
     for source, owner in _places(depsgraph, fluid):
         if is_shown(source, owner):

@@ -209,6 +209,22 @@ class Camera:
         reach = (bounds - self.eye) * axis
         return max(float(reach.min(axis=0).sum()), 0.0), max(float(reach.max(axis=0).sum()), 0.0)
 
+    def region_of(self, bounds: FloatArray) -> Region | None:
+        """The pixels that may see something of a box (2, 3) of world space; None where none does. Of the whole image."""
+        corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), -1).reshape(-1, 3)
+        in_view = (corners - self.eye) @ self.world_from_view[:3, :3]
+        depth = -in_view[:, 2]
+        if depth.max() <= self.clip_start or depth.min() >= self.clip_end:
+            return None
+        if self.is_perspective and depth.min() <= max(self.clip_start, 1e-6 * depth.max()):
+            # A corner beside or behind the eye is seen nowhere, and yet the box may reach across the image.
+            return Region(0, 0, self.width, self.height)
+        places = in_view[:, :2] / depth[:, None] if self.is_perspective else in_view[:, :2]
+        pixels = (places - (self.window.left, self.window.bottom)) / self.pixel_size
+        x_min, y_min = np.maximum(np.floor(pixels.min(axis=0)) - 1, 0)
+        x_max, y_max = np.minimum(np.ceil(pixels.max(axis=0)) + 1, (self.width, self.height))
+        return Region(int(x_min), int(y_min), int(x_max), int(y_max)) if x_min < x_max and y_min < y_max else None
+
     def pixel_centers(self) -> tuple[FloatArray, FloatArray]:
         """Where the region's columns and rows of pixels lie in the window: (width,) and (height,)."""
         region, (pixel_width, pixel_height) = self.active_region, self.pixel_size

@@ -143,6 +143,12 @@ class LiveView:
         with self._changed:
             return self._changed.wait_for(lambda: self._stage() is None, seconds)
 
+    def note_presenting(self, picture: Picture, seconds: float) -> None:
+        """To bring a picture to the screen took so long; the size of the next ones depends on it."""
+        camera = picture.image.camera
+        with self._changed:
+            self._pace.note_presenting(camera.width * camera.height, seconds)
+
     @property
     def pictures(self) -> list[Picture]:
         """The newest samples, all of one view and one size; the first looks through the centres of the pixels."""

@@ -16,6 +16,7 @@ class Pace:
     def __init__(self) -> None:
         self._small: tuple[int, float] | None = None
         self._large: tuple[int, float] | None = None
+        self._presenting = 0.0
 
     def note(self, pixels: int, seconds: float) -> None:
         """An image of so many pixels took so long."""
@@ -25,6 +26,10 @@ class Pace:
             self._large = pixels, seconds
         else:
             self._small = pixels, seconds
+
+    def note_presenting(self, pixels: int, seconds: float) -> None:
+        """To bring an image of so many pixels to the screen took so long."""
+        self._presenting = seconds / pixels
 
     def size(self, width: int, height: int, interval: float) -> tuple[int, int]:
         """Size of the image that can be had at one each `interval` seconds: the whole size or an integer part of it."""
@@ -36,7 +41,7 @@ class Pace:
             return pixels <= _FIRST_PIXELS
         base, per_pixel = self._costs()
         # Where most of the time does not depend on the pixels, fewer of them would only look worse.
-        return per_pixel * pixels <= max(SHARE * interval - base, base / 2)
+        return (per_pixel + self._presenting) * pixels <= max(SHARE * interval - base, base / 2)
 
     def _costs(self) -> tuple[float, float]:
         """Seconds that an image takes apart from its pixels, and seconds a pixel."""

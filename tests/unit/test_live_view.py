@@ -296,6 +296,11 @@ class TestPace:
         assert 0.005 + 5e-8 * pixels <= 0.5 / 24
         assert self.pixels(pace, interval=1 / 60) < pixels < self.pixels(pace, interval=1 / 10)
 
+    def test_bringing_the_image_to_the_screen_counts(self):
+        pace = self.learned(0.001, 5e-9)
+        pace.note_presenting(756_000, 0.02)
+        assert self.pixels(pace) == 756_000 / 4
+
     def test_small_images_are_not_made_where_they_save_nothing(self):
         # No size comes in time; the half of each side takes 0.04 seconds more than none.
         assert Pace.size(self.learned(0.2, 2e-7), 1080, 700, 1 / 24) == (540, 350)
