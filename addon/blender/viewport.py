@@ -33,6 +33,9 @@ LONGEST_WAIT = 0.045
 """Seconds that the handler may take for reading and for waiting together."""
 
 _TICK = 0.01
+_NO_REGION = 0
+"""Stands for the address of a region where Blender draws into an image."""
+
 _STILL_WAIT = 60.0
 """Seconds that a viewport render, which is drawn once, waits for the whole image."""
 
@@ -41,12 +44,29 @@ _STILL_WAIT = 60.0
 class _Viewport:
     """What is kept for a viewport.
 
-    `drawn` is the revision of the live view that was drawn last.
+    Attributes
+    ----------
+    live, presenter
+        Where its images come from, and what draws them.
+    drawn
+        The revision of the live view that was drawn last.
+    seen, seen_by
+        What it looked through last, and by which numbers.
     """
 
     live: LiveView
     presenter: Presenter = field(default_factory=Presenter)
     drawn: int = -1
+    seen: ViewCamera | None = None
+    seen_by: tuple[object, ...] = ()
+
+    def look_at(self, balls: Balls, size: tuple[int, int]) -> ViewCamera | None:
+        """The view that Blender is drawing in this size; None where no ball is in it."""
+        matrices = gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix()
+        seen_by = (*matrices, size, balls)
+        if seen_by != self.seen_by:
+            self.seen, self.seen_by = view_camera(*matrices, *size, balls.bounds), seen_by
+        return self.seen
 
 
 @dataclass(frozen=True)
@@ -112,13 +132,14 @@ class ViewportDrawing:
         balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
         if balls is None:
             return
-        seen = _seen(balls)
+        # What is drawn in another size goes into an image, a viewport render, and is drawn only once.
+        size = gpu.state.viewport_get()[2:]
+        is_window = size == (context.region.width, context.region.height)
+        viewport = self._viewport(context.region.as_pointer() if is_window else _NO_REGION)
+        seen = viewport.look_at(balls, size)
         if seen is None:
             return
-        view = _view(context.scene, balls, seen, look)
-        viewport = self._viewport(context.region, seen)
-        viewport.live.show(view)
-        is_window = _is_window(context.region, seen)
+        viewport.live.show(_view(context.scene, balls, seen, look))
         if is_window:
             viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
         else:
@@ -128,9 +149,7 @@ class ViewportDrawing:
         if is_window and not bpy.app.timers.is_registered(self._tick):
             bpy.app.timers.register(self._tick, first_interval=_TICK)
 
-    def _viewport(self, region: bpy.types.Region, seen: ViewCamera) -> _Viewport:
-        # What is drawn into an image of another size, a viewport render, does not disturb the viewport itself.
-        key = region.as_pointer() if _is_window(region, seen) else 0
+    def _viewport(self, key: int) -> _Viewport:
         if key not in self._viewports:
             self._viewports[key] = _Viewport(self._renderer.open())
         return self._viewports[key]
@@ -164,8 +183,7 @@ class ViewportDrawing:
             region, area = regions[key]
             if viewport.drawn != viewport.live.revision:
                 region.tag_redraw()
-            is_resting = viewport.live.is_at_rest and viewport.drawn == viewport.live.revision
-            is_busy |= not is_resting
+            is_busy |= not viewport.live.is_at_rest or viewport.drawn != viewport.live.revision
             if STATUS.has_news:
                 _redraw_sidebar(area)
         STATUS.has_news = False
@@ -180,17 +198,6 @@ class ViewportDrawing:
         """Textures are released where Blender's graphics context is surely active: in a handler."""
         while self._dropped:
             self._dropped.pop().presenter.release()
-
-
-def _seen(balls: Balls) -> ViewCamera | None:
-    """The view that Blender is drawing, in the size in which it draws it; None where no ball is in it."""
-    _, _, width, height = gpu.state.viewport_get()
-    return view_camera(gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix(), width, height, balls.bounds)
-
-
-def _is_window(region: bpy.types.Region, seen: ViewCamera) -> bool:
-    """Whether Blender draws the viewport in its window, not into an image."""
-    return (seen.camera.width, seen.camera.height) == (region.width, region.height)
 
 
 def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
