@@ -33,11 +33,6 @@ LONGEST_WAIT = 0.045
 """Seconds that the handler may take for reading and for waiting together."""
 
 _TICK = 0.01
-_NO_REGION = 0
-"""Stands for the address of a region where Blender draws into an image."""
-
-_STILL_WAIT = 60.0
-"""Seconds that a viewport render, which is drawn once, waits for the whole image."""
 
 
 @dataclass
@@ -60,10 +55,11 @@ class _Viewport:
     seen: ViewCamera | None = None
     seen_by: tuple[object, ...] = ()
 
-    def look_at(self, balls: Balls, size: tuple[int, int]) -> ViewCamera | None:
-        """The view that Blender is drawing in this size; None where no ball is in it."""
+    def look_at(self, balls: Balls) -> ViewCamera | None:
+        """The view that Blender is drawing; None where no ball is in it."""
+        _, _, *size = gpu.state.viewport_get()
         matrices = gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix()
-        seen_by = (*matrices, size, balls)
+        seen_by = (*matrices, *size, balls)
         if seen_by != self.seen_by:
             self.seen, self.seen_by = view_camera(*matrices, *size, balls.bounds), seen_by
         return self.seen
@@ -86,13 +82,15 @@ class ViewportDrawing:
         self._viewports: dict[int, _Viewport] = {}
         self._dropped: list[_Viewport] = []
         self._pause: _Pause | None = None
+        # Blender knows a timer by its address, and a bound method has a new one each time.
+        self._timer = self._tick
         self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def close(self) -> None:
         """Draw no more, and release everything."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
-        if bpy.app.timers.is_registered(self._tick):
-            bpy.app.timers.unregister(self._tick)
+        if bpy.app.timers.is_registered(self._timer):
+            bpy.app.timers.unregister(self._timer)
         self._renderer.close()
         self.forget()
         self._release_dropped()
@@ -123,6 +121,8 @@ class ViewportDrawing:
             self._stop(look, str(error), "")
         except Exception as error:  # noqa: BLE001 - whatever it is, the user sees it once and Blender goes on
             self._stop(look, f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
+        if not bpy.app.timers.is_registered(self._timer):
+            bpy.app.timers.register(self._timer, first_interval=_TICK)
 
     def _stop(self, look: Look, problem: str, details: str) -> None:
         self._pause = _Pause(CHANGES.revision, look)
@@ -132,22 +132,14 @@ class ViewportDrawing:
         balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
         if balls is None:
             return
-        # What is drawn in another size goes into an image, a viewport render, and is drawn only once.
-        size = gpu.state.viewport_get()[2:]
-        is_window = size == (context.region.width, context.region.height)
-        viewport = self._viewport(context.region.as_pointer() if is_window else _NO_REGION)
-        seen = viewport.look_at(balls, size)
+        viewport = self._viewport(context.region.as_pointer())
+        seen = viewport.look_at(balls)
         if seen is None:
             return
         viewport.live.show(_view(context.scene, balls, seen, look))
-        if is_window:
-            viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
-        else:
-            viewport.live.wait_until_rest(_STILL_WAIT)
+        viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
         self._present(viewport, look, seen)
         self._report(viewport, balls)
-        if is_window and not bpy.app.timers.is_registered(self._tick):
-            bpy.app.timers.register(self._tick, first_interval=_TICK)
 
     def _viewport(self, key: int) -> _Viewport:
         if key not in self._viewports:

@@ -138,11 +138,6 @@ class LiveView:
         with self._changed:
             return self._changed.wait_for(self._is_answered, seconds)
 
-    def wait_until_rest(self, seconds: float) -> bool:
-        """Wait until nothing more will come; whether that was in time."""
-        with self._changed:
-            return self._changed.wait_for(lambda: self._stage() is None, seconds)
-
     def note_presenting(self, picture: Picture, seconds: float) -> None:
         """To bring a picture to the screen took so long; the size of the next ones depends on it."""
         camera = picture.image.camera

@@ -69,7 +69,9 @@ def renderer(fake):
 
 
 def rest(live):
-    assert live.wait_until_rest(SOON)
+    """Wait until nothing more will come."""
+    with live._changed:
+        assert live._changed.wait_for(lambda: live._stage() is None, SOON)
 
 
 def test_a_view_is_refined_and_then_antialiased(renderer, fake):
