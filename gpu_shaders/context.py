@@ -22,6 +22,7 @@ from .debug_output import DebugOutput
 from .driver_state import CONTEXT_LOST, DriverState
 from .limits import Limits
 from .programs import ProgramSource
+from .sharing import SharingContext
 
 Result = TypeVar("Result")
 
@@ -56,17 +57,20 @@ class GpuContext:
         There is no OpenGL, or none of version 3.3.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, sharing: SharingContext | None = None) -> None:
+        self.shares = sharing is not None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
         self._programs: dict[ProgramSource, moderngl.Program] = {}
         # As many as tell what is wrong, where nobody takes them.
         self._messages: deque[str] = deque(maxlen=64)
         self.is_lost = False
-        self._thread.submit(self._open).result()
+        self._thread.submit(self._open, sharing).result()
 
-    def _open(self) -> None:
+    def _open(self, sharing: SharingContext | None) -> None:
         try:
-            self._glcontext = _standalone_glcontext()
+            self._glcontext = _standalone_glcontext() if sharing is None else sharing
+            if sharing is not None:
+                sharing.__enter__()
             self.gl = moderngl.create_context(require=330, standalone=True, context=self._glcontext)
         # glcontext and moderngl raise bare Exception for whatever the driver lacks.
         except Exception as error:
