@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import weakref
 
 import moderngl
 
@@ -16,7 +17,7 @@ _TEXEL_BYTES = 8
 
 
 class BufferTexture:
-    """Pairs of 32-bit unsigned integers, kept until the context ends.
+    """Pairs of 32-bit unsigned integers.
 
     Attributes
     ----------
@@ -35,6 +36,7 @@ class BufferTexture:
         name = unsigned()
         context.function("glGenTextures", ctypes.c_int, ctypes.c_void_p)(1, ctypes.byref(name))
         self._name = name.value
+        weakref.finalize(self, context.delete_texture, self._name)
         self.use(0)
         context.function("glTexBuffer", unsigned, unsigned, unsigned)(_GL_TEXTURE_BUFFER, _GL_RG32UI, self.buffer.glo)
 

@@ -1,7 +1,8 @@
 """The OpenGL context: one for the process, on a thread of its own.
 
 A standalone context made on Blender's main thread would alias Blender's own; on a thread of its own it disturbs nothing,
-in the interface as well as with --background. All OpenGL work goes through :meth:`GpuContext.run`.
+in the interface as well as with --background. All OpenGL work goes through :meth:`GpuContext.run`. Where Blender runs on OpenGL
+as well, the process's context may share its objects with Blender's: :func:`share_with_current_context`.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ import ctypes
 import platform
 from collections import deque
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import glcontext
 import moderngl
@@ -22,9 +23,10 @@ from .debug_output import DebugOutput
 from .driver_state import CONTEXT_LOST, DriverState
 from .limits import Limits
 from .programs import ProgramSource
-from .sharing import SharingContext
+from .sharing import SharingContext, sharing_context
 
 Result = TypeVar("Result")
+Kept = TypeVar("Kept")
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 _GL_TEXTURE_2D = 0x0DE1
@@ -38,7 +40,12 @@ _LOST = (
 
 
 class GpuContext:
-    """A standalone OpenGL context.
+    """An OpenGL context on a thread of its own.
+
+    Parameters
+    ----------
+    sharing
+        A context of the window system to use; None for a standalone one.
 
     Attributes
     ----------
@@ -48,6 +55,8 @@ class GpuContext:
         What the driver calls itself, and its OpenGL version as moderngl writes it (330).
     limits
         How much it can take at once.
+    shares
+        Whether it shares its objects with another context of the process.
     is_lost
         Whether the driver was seen to have lost the context, or it was closed; nothing can be done in it any more.
 
@@ -61,6 +70,8 @@ class GpuContext:
         self.shares = sharing is not None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
         self._programs: dict[ProgramSource, moderngl.Program] = {}
+        self._kept: dict[type, Any] = {}
+        self._deleted_textures: deque[int] = deque()
         # As many as tell what is wrong, where nobody takes them.
         self._messages: deque[str] = deque(maxlen=64)
         self.is_lost = False
@@ -74,6 +85,8 @@ class GpuContext:
             self.gl = moderngl.create_context(require=330, standalone=True, context=self._glcontext)
         # glcontext and moderngl raise bare Exception for whatever the driver lacks.
         except Exception as error:
+            if sharing is not None:
+                sharing.release()
             raise DeviceError(
                 f"OpenGL 3.3 is not available here ({error}); use the CPU back-end or install a driver"
             ) from error
@@ -84,6 +97,7 @@ class GpuContext:
         self.limits = Limits.from_info(self.gl.info)
         self._driver = DriverState(self.gl, self.function)
         self._debug_output = DebugOutput(self.gl, self.function)
+        self._delete_textures = self.function("glDeleteTextures", ctypes.c_int, ctypes.c_void_p)
         self._use_program = self.function("glUseProgram", ctypes.c_uint)
         self._uniform_1i = self.function("glUniform1i", ctypes.c_int, ctypes.c_int)
         self._bind_texture = self.function("glBindTexture", ctypes.c_uint, ctypes.c_uint)
@@ -107,9 +121,28 @@ class GpuContext:
             self._check_driver(error)
             raise
         finally:
-            self.gl.gc()
+            self._collect()
         self._check_driver(None)
         return result
+
+    def kept(self, kind: Callable[[GpuContext], Kept]) -> Kept:
+        """What `kind` makes of the context: made at the first call, kept until the context is closed."""
+        if kind not in self._kept:
+            self._kept[kind] = kind(self)
+        return cast(Kept, self._kept[kind])
+
+    def delete_texture(self, name: int) -> None:
+        """Have a texture deleted that moderngl does not know; on any thread."""
+        self._deleted_textures.append(name)
+
+    def collect(self) -> None:
+        """Have the memory of objects freed that nobody holds any more, without waiting for it."""
+        self._thread.submit(lambda: None if self.is_lost else self._collect())
+
+    def _collect(self) -> None:
+        self.gl.gc()
+        while self._deleted_textures:
+            self._delete_textures(1, ctypes.byref(ctypes.c_uint(self._deleted_textures.popleft())))
 
     def _check_driver(self, failure: Exception | None) -> None:
         """Raise DeviceError where the driver was reset, else for the driver's own part in a failure, else for its errors."""
@@ -132,12 +165,19 @@ class GpuContext:
         self._messages.clear()
         return messages
 
-    def close(self) -> None:
-        """Give the context back to the driver. It does not wait for that: the driver may hang."""
-        self.is_lost = True
-        self._thread.submit(self._close)
+    def close(self) -> Future[None]:
+        """Give the context and its objects back to the driver, after the work that was asked for before.
+
+        It does not wait for that: the driver may hang.
+        """
+        return self._thread.submit(self._close)
 
     def _close(self) -> None:
+        self.is_lost = True
+        # What it shares would outlive it.
+        self._kept.clear()
+        self._programs.clear()
+        self._collect()
         # A context is destroyed once it is current nowhere.
         with self._glcontext:
             self._glcontext.release()
@@ -234,3 +274,28 @@ def shared_context() -> GpuContext:
             lost, _shared = _shared, GpuContext()
             lost.close()
         return _shared
+
+
+def share_with_current_context() -> None:
+    """From now on the process's context shares its objects with the one that is current on this thread; that stays current.
+
+    Nothing happens where it shares already. The program around it must call :func:`close_context` before it ends.
+    DeviceError where it cannot be; then the process's context stays what it is.
+    """
+    global _shared
+    with _opening:
+        if isinstance(_shared, GpuContext) and _shared.shares and not _shared.is_lost:
+            return
+        sharing = GpuContext(sharing_context())
+        before, _shared = _shared, sharing
+    if isinstance(before, GpuContext):
+        before.close()
+
+
+def close_context(seconds: float = 5.0) -> None:
+    """Close the process's context, and wait for it so long; another one is opened when it is asked for."""
+    global _shared
+    with _opening:
+        before, _shared = _shared, None
+    if isinstance(before, GpuContext):
+        wait([before.close()], seconds)

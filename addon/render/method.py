@@ -126,6 +126,52 @@ class ProgressiveMethod(Method, Protocol):
         ...
 
 
+class DeviceSurface(Protocol):
+    """A surface that stays on the graphics processor.
+
+    Attributes
+    ----------
+    size
+        Width and height, pixels.
+    milliseconds, counts
+        As in :class:`Surface`.
+    """
+
+    size: tuple[int, int]
+    milliseconds: dict[str, float]
+    counts: dict[str, int]
+
+    @property
+    def passes(self) -> tuple[str, ...]:
+        """What there is of it, in order: depth and normal, then the attributes."""
+        ...
+
+    def copy_to_attachments(self) -> None:
+        """Copy the passes to the textures of the framebuffer that is bound in the context current on this thread.
+
+        They have 32-bit floats, depth one channel, the others four. DeviceError where the driver refuses.
+        """
+        ...
+
+    def release(self) -> None:
+        """Give the memory back, on any thread; nothing can be copied any more."""
+        ...
+
+
+@runtime_checkable
+class DeviceMethod(Method, Protocol):
+    """A method that can leave the surface on the graphics processor."""
+
+    @property
+    def shares_textures(self) -> bool:
+        """Whether another context of the process can use its textures, so that it is worth to leave them there."""
+        ...
+
+    def find_surface_on_device(self, request: Request) -> DeviceSurface:
+        """The same surface as that of :meth:`find_surface`."""
+        ...
+
+
 @contextmanager
 def timed(milliseconds: dict[str, float], stage: str) -> Iterator[None]:
     """Note how long the block takes as a stage."""

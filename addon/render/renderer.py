@@ -17,7 +17,8 @@ from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from .depth_contrast import spatial_importance
-from .method import Attribute, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
+from .device_image import DeviceImage
+from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .shading import headlight
 
@@ -101,6 +102,32 @@ def render_progressively(
         yield shot.image(shot.runner.find_surface(shot.request))
 
 
+def render_to_show(
+    balls: Balls,
+    camera: Camera,
+    field: Field,
+    method: str = "auto",
+    backend: str = "auto",
+    passes: Iterable[str] = ("depth", "normal"),
+    is_cancelled: Callable[[], bool] | None = None,
+    threads: int = 0,
+) -> ImageBuffers | DeviceImage:
+    """Render the surface of a fluid for Blender to draw.
+
+    The parameters and the errors are those of :func:`render`.
+
+    Returns
+    -------
+    A DeviceImage where the method runs on an OpenGL that shares its textures with Blender's and the passes can stay there, else
+    ImageBuffers.
+    """
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, None, is_cancelled, None, threads)
+    runner = shot.runner
+    if isinstance(runner, DeviceMethod) and runner.shares_textures and camera.region is None and shot.can_stay_on_device:
+        return shot.device_image(runner.find_surface_on_device(shot.request))
+    return shot.image(runner.find_surface(shot.request))
+
+
 @dataclass(frozen=True)
 class _Shot:
     """One view to be rendered by a method."""
@@ -135,12 +162,26 @@ class _Shot:
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)
         return cls(info, runner, request, camera, names, look or Look())
 
-    def image(self, surface: Surface) -> ImageBuffers:
-        """The passes of what the method has found."""
+    @property
+    def can_stay_on_device(self) -> bool:
+        """Whether the passes are what the method finds, and nothing that is made from it."""
+        has_colors = self.request.balls.colors is not None
+        return all(name in ("depth", "normal") or (name == "color" and has_colors) for name in self.passes)
+
+    def device_image(self, surface: DeviceSurface) -> DeviceImage:
+        """What the method has left on the graphics processor."""
+        return DeviceImage(self.camera, surface, self._report(surface))
+
+    def _report(self, surface: Surface | DeviceSurface) -> RenderInfo:
         balls = self.request.balls
         report = RenderInfo(self.info.name, self.info.backend, self.runner.device, dropped=dict(balls.dropped))
         report.milliseconds = dict(surface.milliseconds)
         report.counts = {"balls": len(balls), **surface.counts}
+        return report
+
+    def image(self, surface: Surface) -> ImageBuffers:
+        """The passes of what the method has found."""
+        report = self._report(surface)
         with timed(report.milliseconds, "passes"):
             hit = surface.hit
             makers = self._makers(surface, hit)

@@ -15,6 +15,7 @@ from ...capture import Range
 from ...context import GpuContext
 from ...occlusion import OcclusionQuery
 from ...step import Step, Texture
+from ...surface_textures import SurfaceTextures
 from .programs import LIST_TARGETS, Phase, Variant
 from .targets import Workspace
 
@@ -74,7 +75,13 @@ class Frame:
             # Drivers may ask for the cells even where a program has them only from an include.
             step.textures.update({**textures, **self._cells.textures})
 
-    def draw(self, group_starts: npt.NDArray[np.int64], group_corners: npt.NDArray[np.float32] | None) -> dict[str, int]:
+    def draw(
+        self,
+        group_starts: npt.NDArray[np.int64],
+        group_corners: npt.NDArray[np.float32] | None,
+        output: SurfaceTextures,
+        corner: tuple[int, int],
+    ) -> dict[str, int]:
         """Find the surface; counts of what happened.
 
         Parameters
@@ -83,6 +90,8 @@ class Frame:
             (G + 1,): where the groups of balls begin and end.
         group_corners
             (G, 4, 3): the groups' rectangles, see `Groups.corners`; None: all groups are drawn.
+        output, corner
+            Where the surface goes, and the pixel there that is the lowest and leftmost of this frame.
         """
         self._gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
         self._begin()
@@ -94,12 +103,8 @@ class Frame:
         counts["overflows"] = self._count_walkers()
         counts["walks"] = self._walk(pairs) if counts["overflows"] else 0
         self._gather(pairs)
+        self._finish(output, corner)
         return counts
-
-    def read(self, output: int) -> npt.NDArray[np.float32]:
-        """(height, width, 4): an output of finish.frag."""
-        width, height = self._targets.size
-        return np.frombuffer(self._targets.outputs[output].read(), np.float32).reshape(height, width, 4)
 
     def _state(self) -> moderngl.Texture:
         return self._targets.lists[self._now][0]
@@ -256,14 +261,20 @@ class Frame:
         return query.samples
 
     def _gather(self, pairs: Pairs) -> None:
-        """Sum the gradient and the colours at the surface; make the outputs."""
+        """Sum the gradient and the colours at the surface."""
         targets = self._targets
         self._ask_cells(Phase.DONE)
         targets.gather.clear()
         self._blend(moderngl.FUNC_ADD)
         self._over_pairs("gather", targets.gather, moderngl.BLEND, self._keep(pairs, Phase.DONE), state_tx=self._state())
-        read = {"state_tx": self._state(), "gradient_tx": targets.sums[0], "color_sum_tx": targets.sums[1]}
-        self._over_screen("finish", targets.finish, **read)
+
+    def _finish(self, output: SurfaceTextures, corner: tuple[int, int]) -> None:
+        """Write the surface into its place."""
+        assert output.framebuffer is not None
+        output.framebuffer.viewport = (*corner, *self._targets.size)
+        self._steps["finish"].set_uniforms({"part_corner": tuple(map(float, corner))})
+        sums = self._targets.sums
+        self._over_screen("finish", output.framebuffer, state_tx=self._state(), gradient_tx=sums[0], color_sum_tx=sums[1])
 
     def _diagnostics(self, pairs: Pairs) -> dict[str, int]:
         """Counts that cost time."""

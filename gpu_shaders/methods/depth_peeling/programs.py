@@ -8,6 +8,7 @@ from enum import IntEnum
 from itertools import product
 
 from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ...programs import ProgramSource
 from .options import Options
 
@@ -92,7 +93,7 @@ class Variant:
         yield _program("count_walkers", "screen", "count_walkers")
         yield _program("begin_walk", "screen", "begin_walk")
         yield _program("walk_step", "tile", "walk_step", **cells)
-        yield _program("finish", "screen", "finish")
+        yield _program("finish", "screen", "finish", DEPTH_BACKGROUND=f"float({DEPTH_BACKGROUND!r})")
         for phase in Phase:
             constants = {"CELL_SIZE": CELL_SIZE, "CELL_PHASE": int(phase)}
             yield _program(f"cells_from_pixels_{phase.name.lower()}", "screen", "cells_from_pixels", **constants)

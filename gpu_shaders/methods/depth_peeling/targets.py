@@ -61,7 +61,6 @@ class Targets:
         self.lists = [[words(4) for _ in range(LIST_TARGETS)] for _ in range(2)]
         self.iterations = [words(4) for _ in range(2)] if with_iterations else []
         self.sums = [floats(4) for _ in range(2)]
-        self.outputs = [floats(4) for _ in range(2)]
         self.kernel = gl.framebuffer([], self.kernel_depth)
         self.start = gl.framebuffer([self.start_density])
         # Before the first peel the state lies where later the second texel of the list does.
@@ -75,7 +74,6 @@ class Targets:
         self.state_only = [gl.framebuffer(targets[:1]) for targets in self.lists]
         self.walk = gl.framebuffer(self.sums[:1])
         self.gather = gl.framebuffer(self.sums)
-        self.finish = gl.framebuffer(self.outputs)
         self.cells = CellTargets(gl, size)
 
 

@@ -1,0 +1,104 @@
+"""A surface that stays on the graphics processor, and the way from there into the textures of another context."""
+
+from __future__ import annotations
+
+import ctypes
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ..addon.fluid.errors import DeviceError
+from ..addon.fluid.passes import DEPTH_BACKGROUND
+from .context import GpuContext
+
+_GL_TEXTURE_2D = 0x0DE1
+_GL_DRAW_FRAMEBUFFER = 0x8CA9
+_GL_COLOR_ATTACHMENT0 = 0x8CE0
+_GL_ATTACHMENT_NAME = 0x8CD1
+
+
+class SurfaceTextures:
+    """What a method finds, as textures of 32-bit floats; row 0 at the bottom.
+
+    Made, drawn and read on the context's thread; copied where the context is current with which that one shares its objects,
+    and released on any thread.
+
+    Attributes
+    ----------
+    size
+        Width and height, pixels.
+    textures
+        "depth" has one channel, "normal" and "color" have four, of which the last says nothing: see :class:`method.Surface`.
+        Empty after the release.
+    framebuffer
+        Draws into them in this order.
+    milliseconds, counts
+        As in :class:`method.Surface`.
+    """
+
+    def __init__(self, context: GpuContext, size: tuple[int, int], with_color: bool) -> None:
+        gl = context.gl
+        self.size = size
+        self.textures: dict[str, moderngl.Texture] = {
+            "depth": gl.texture(size, 1, dtype="f4"),
+            "normal": gl.texture(size, 4, dtype="f4"),
+        }
+        if with_color:
+            self.textures["color"] = gl.texture(size, 4, dtype="f4")
+        self.framebuffer: moderngl.Framebuffer | None = gl.framebuffer(list(self.textures.values()))
+        self.milliseconds: dict[str, float] = {}
+        self.counts: dict[str, int] = {}
+        self._context = context
+        self._get_attachment = context.function("glGetFramebufferAttachmentParameteriv", *[ctypes.c_uint] * 3, ctypes.c_void_p)
+        self._get_error = context.function("glGetError", result=ctypes.c_uint)
+
+    @property
+    def passes(self) -> tuple[str, ...]:
+        """See :meth:`method.DeviceSurface.passes`."""
+        return tuple(self.textures)
+
+    def clear(self) -> None:
+        """Make it the surface of nothing."""
+        assert self.framebuffer is not None
+        self.framebuffer.clear()
+        width, height = self.size
+        self.textures["depth"].write(np.full((height, width), DEPTH_BACKGROUND, np.float32))
+
+    def read(self, name: str) -> npt.NDArray[np.float32]:
+        """(height, width) depth, else (height, width, 3)."""
+        width, height = self.size
+        texture = self.textures[name]
+        pixels = np.frombuffer(texture.read(), np.float32).reshape(height, width, texture.components)
+        return pixels[..., 0] if texture.components == 1 else pixels[..., :3]
+
+    def copy_to_attachments(self) -> None:
+        """Copy the textures, in their order, to those of the framebuffer that is bound in the context current on this thread.
+
+        These must have the same size and formats. Nothing leaves the graphics processor, and no state of the context changes.
+        DeviceError where the driver refuses.
+        """
+        # Functions of OpenGL 4.3, which the context itself need not have.
+        copy = self._context.function("glCopyImageSubData", *[ctypes.c_uint] * 2, *[ctypes.c_int] * 4, *_COPY_TARGET)
+        # Errors from before are not ours.
+        self._errors()
+        for number, texture in enumerate(self.textures.values()):
+            target = ctypes.c_int()
+            attachment = _GL_COLOR_ATTACHMENT0 + number
+            self._get_attachment(_GL_DRAW_FRAMEBUFFER, attachment, _GL_ATTACHMENT_NAME, ctypes.byref(target))
+            copy(texture.glo, _GL_TEXTURE_2D, 0, 0, 0, 0, target.value, _GL_TEXTURE_2D, 0, 0, 0, 0, *self.size, 1)
+        if self._errors():
+            raise DeviceError("The graphics driver does not copy textures from one context to another")
+
+    def _errors(self) -> bool:
+        """Whether the driver has noted errors; it forgets them."""
+        # A context that is lost may repeat its error for ever.
+        return sum(bool(self._get_error()) for _ in range(8)) > 0
+
+    def release(self) -> None:
+        """Give the textures back; what was copied stays."""
+        self.textures, self.framebuffer = {}, None
+        self._context.collect()
+
+
+_COPY_TARGET = (*[ctypes.c_uint] * 2, *[ctypes.c_int] * 7)
