@@ -70,7 +70,7 @@ class GpuContext:
         self.shares = sharing is not None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
         self._programs: dict[ProgramSource, moderngl.Program] = {}
-        self._kept: dict[type, Any] = {}
+        self._kept: dict[Callable[[GpuContext], Any], Any] = {}
         self._deleted_textures: deque[int] = deque()
         # As many as tell what is wrong, where nobody takes them.
         self._messages: deque[str] = deque(maxlen=64)
@@ -79,7 +79,8 @@ class GpuContext:
 
     def _open(self, sharing: SharingContext | None) -> None:
         try:
-            self._glcontext = _standalone_glcontext() if sharing is None else sharing
+            own: Any = _standalone_glcontext() if sharing is None else sharing
+            self._glcontext = own
             if sharing is not None:
                 sharing.__enter__()
             self.gl = moderngl.create_context(require=330, standalone=True, context=self._glcontext)
@@ -92,6 +93,7 @@ class GpuContext:
             ) from error
         # Python may collect an object on any thread; OpenGL frees it on its own, when asked.
         self.gl.gc_mode = "context_gc"
+        self._no_framebuffer = self.gl.detect_framebuffer(0)
         self.renderer = self.gl.info["GL_RENDERER"]
         self.version = self.gl.version_code
         self.limits = Limits.from_info(self.gl.info)
@@ -140,6 +142,8 @@ class GpuContext:
         self._thread.submit(lambda: None if self.is_lost else self._collect())
 
     def _collect(self) -> None:
+        # moderngl holds the framebuffer that was used last, and with it what is attached there.
+        self._no_framebuffer.use()
         self.gl.gc()
         while self._deleted_textures:
             self._delete_textures(1, ctypes.byref(ctypes.c_uint(self._deleted_textures.popleft())))

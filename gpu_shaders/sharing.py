@@ -160,7 +160,8 @@ class GlxContext(SharingContext):
             set_handler(before)
 
     def load(self, name: str) -> int | None:
-        return self._load(name.encode())
+        address: int | None = self._load(name.encode())
+        return address
 
     def __enter__(self) -> None:
         if not self._make_current(self._display, self._pbuffer, self._pbuffer, self._context):
@@ -214,7 +215,8 @@ class EglContext(SharingContext):
         return config.value
 
     def load(self, name: str) -> int | None:
-        return self._load(name.encode())
+        address: int | None = self._load(name.encode())
+        return address
 
     def __enter__(self) -> None:
         # Which interface a thread means is a state of its own in EGL.
