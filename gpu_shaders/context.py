@@ -283,7 +283,7 @@ def shared_context() -> GpuContext:
 def share_with_current_context() -> None:
     """From now on the process's context shares its objects with the one that is current on this thread; that stays current.
 
-    Nothing happens where it shares already. The program around it must call :func:`close_context` before it ends.
+    Nothing happens where it shares already. The program must call :func:`close_context` before it closes its own context.
     DeviceError where it cannot be; then the process's context stays what it is.
     """
     global _shared
@@ -294,6 +294,11 @@ def share_with_current_context() -> None:
         before, _shared = _shared, sharing
     if isinstance(before, GpuContext):
         before.close()
+
+
+def stop_sharing() -> None:
+    """Leave nothing to other contexts any more. The context itself stays, as what it has made is still in use."""
+    shared_context().shares = False
 
 
 def close_context(seconds: float = 5.0) -> None:

@@ -21,8 +21,8 @@ _GL_ATTACHMENT_NAME = 0x8CD1
 class SurfaceTextures:
     """What a method finds, as textures of 32-bit floats; row 0 at the bottom.
 
-    Made, drawn and read on the context's thread; copied where the context is current with which that one shares its objects,
-    and released on any thread.
+    Made, drawn and read on the context's thread, except for :meth:`read_back`. Copied where the context is current with which
+    that one shares its objects. Released on any thread.
 
     Attributes
     ----------
@@ -71,6 +71,10 @@ class SurfaceTextures:
         texture = self.textures[name]
         pixels = np.frombuffer(texture.read(), np.float32).reshape(height, width, texture.components)
         return pixels[..., 0] if texture.components == 1 else pixels[..., :3]
+
+    def read_back(self) -> dict[str, npt.NDArray[np.float32]]:
+        """See :meth:`method.DeviceSurface.read_back`."""
+        return self._context.run(lambda: {name: self.read(name) for name in self.textures})
 
     def copy_to_attachments(self) -> None:
         """Copy the textures, in their order, to those of the framebuffer that is bound in the context current on this thread.

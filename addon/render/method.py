@@ -146,6 +146,10 @@ class DeviceSurface(Protocol):
         """What there is of it, in order: depth and normal, then the attributes."""
         ...
 
+    def read_back(self) -> dict[str, npt.NDArray[np.float32]]:
+        """The passes as arrays, as in :class:`Surface`; on any thread."""
+        ...
+
     def copy_to_attachments(self) -> None:
         """Copy the passes to the textures of the framebuffer that is bound in the context current on this thread.
 

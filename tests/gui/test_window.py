@@ -1,12 +1,11 @@
 """The extension in a Blender that has a window: what it draws, and that it leaves Blender's own drawing alone."""
 
 import importlib
-import os
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from window import redraw, screenshot
 
 
 @pytest.fixture
@@ -24,21 +23,6 @@ def properties_editor():
     """The properties editor of the window."""
     screen = bpy.context.window_manager.windows[0].screen
     return next(area for area in screen.areas if area.type == "PROPERTIES")
-
-
-def redraw():
-    window = bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window, screen=window.screen):
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
-
-
-def screenshot():
-    """(height, width, 3) bytes, blue first: what the X server shows. It keeps its screen in an XWD file."""
-    content = Path(os.environ["MENISCUS_SCREEN"]).read_bytes()
-    header_size, _, _, _, width, height, *_ = header = np.frombuffer(content, ">u4", 25).tolist()
-    bytes_per_line, color_count = header[12], header[19]
-    pixels = np.frombuffer(content, np.uint8, bytes_per_line * height, header_size + 12 * color_count)
-    return pixels.reshape(height, bytes_per_line)[:, : 4 * width].reshape(height, width, 4)[..., :3].copy()
 
 
 @pytest.fixture

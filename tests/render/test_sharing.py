@@ -101,7 +101,10 @@ class Program:
         finally:
             for item in (framebuffer, *textures):
                 item.release()
-        return {name: image[..., 0] if name == "depth" else image[..., :3] for name, image in zip(surface.passes, pixels)}
+        return {
+            name: image[..., 0] if name == "depth" else image[..., :3]
+            for name, image in zip(surface.passes, pixels, strict=True)
+        }
 
 
 @pytest.fixture
@@ -181,7 +184,7 @@ def test_a_context_that_shares_with_none_reads_back():
 
 def test_textures_of_another_size_are_refused_in_one_sentence(program, sharing):
     surface = show(scene()).surface
-    with pytest.raises(DeviceError, match="^The graphics driver does not copy textures from one context to another$"):
+    with pytest.raises(DeviceError, match=r"^The graphics driver does not copy textures from one context to another$"):
         program.run(program._copy, surface, (50, 40))
     # The program finds no error that is not its own.
     assert program.run(program.function("glGetError", result=ctypes.c_uint)) == 0
@@ -249,7 +252,7 @@ def test_without_a_current_context_there_is_nothing_to_share_with(monkeypatch):
     present = context_module.shared_context()
     with (
         ThreadPoolExecutor(1) as thread,
-        pytest.raises(DeviceError, match="^There is no OpenGL context here with which textures can be shared$"),
+        pytest.raises(DeviceError, match=r"^There is no OpenGL context here with which textures can be shared$"),
     ):
         thread.submit(context_module.share_with_current_context).result()
     assert context_module.shared_context() is present
