@@ -26,6 +26,7 @@ from .preferences import preferences
 from .presenter import Presenter, PresentView
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
+from .texture_sharing import SHARING
 from .view_camera import ViewCamera, view_camera
 from .viewport_status import STATUS
 
@@ -94,6 +95,7 @@ class ViewportDrawing:
         self._renderer.close()
         self.forget()
         self._release_dropped()
+        SHARING.end()
 
     def forget(self) -> None:
         """Drop what belongs to the file that was open."""
@@ -136,7 +138,10 @@ class ViewportDrawing:
         seen = viewport.look_at(balls)
         if seen is None:
             return
-        viewport.live.show(_view(context.scene, balls, seen, look))
+        view = _view(context.scene, balls, seen, look)
+        if view.backend != "cpu":
+            SHARING.begin()
+        viewport.live.show(view)
         viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
         self._present(viewport, look, seen)
         self._report(viewport, balls)

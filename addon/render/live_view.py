@@ -17,16 +17,17 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
+from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
-from .renderer import render
+from .renderer import render_to_show
 
 SETTLE_SECONDS = 0.06
 """How long a view must stay the same before it is refined: longer than from one image to the next while it moves."""
 
 _BYTES_PER_CHANNEL = 4
 
-Render = Callable[..., ImageBuffers]
+Render = Callable[..., ImageBuffers | DeviceImage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,7 @@ class Picture:
         0 and the speed of the fastest ball, Blender units a second.
     """
 
-    image: ImageBuffers
+    image: ImageBuffers | DeviceImage
     view: View
 
     @property
@@ -213,10 +214,10 @@ class LiveRenderer:
     Parameters
     ----------
     render
-        What makes an image, as :func:`renderer.render`.
+        What makes an image, as :func:`renderer.render_to_show`.
     """
 
-    def __init__(self, render: Render = render) -> None:
+    def __init__(self, render: Render = render_to_show) -> None:
         self._render = render
         self._changed = Condition()
         self._views: list[LiveView] = []
