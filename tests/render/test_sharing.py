@@ -190,6 +190,11 @@ def test_textures_of_another_size_are_refused_in_one_sentence(program, sharing):
     assert program.run(program.function("glGetError", result=ctypes.c_uint)) == 0
 
 
+def wait_until_idle(context):
+    """Wait for what nobody waits for; unlike any work it frees nothing by itself."""
+    context._thread.submit(lambda: None).result()
+
+
 def test_nothing_piles_up_and_nothing_stays_behind(program, monkeypatch):
     monkeypatch.setattr(context_module, "_shared", None)
     before = program.objects()
@@ -200,13 +205,24 @@ def test_nothing_piles_up_and_nothing_stays_behind(program, monkeypatch):
             surface = show(scene(seed=number), ("depth", "normal", "color")).surface
             program.copy(surface)
             surface.release()
-            context_module.shared_context().run(lambda: None)
+            wait_until_idle(context_module.shared_context())
             counts.append(program.objects())
         assert counts[1] == counts[-1]
         assert counts[-1]["Texture"] > before["Texture"]
         check_silence(context_module.shared_context())
         context_module.close_context()
         assert program.objects() == before
+
+
+def test_a_surface_that_is_released_is_given_back_without_further_work(program, sharing):
+    show(scene())
+    sharing.run(lambda: None)
+    before = program.objects()
+    image = show(scene())
+    assert program.objects() != before
+    image.surface.release()
+    wait_until_idle(sharing)
+    assert program.objects() == before
 
 
 def test_a_surface_that_nobody_holds_is_given_back(program, sharing):
