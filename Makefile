@@ -1,7 +1,8 @@
 # Any Python 3 can set the rest up; see tools/environments.py.
 PYTHON ?= python3
 VENV := .venv/bin/python
-HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own
+HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
+	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures lint format extension lock clean $(HOSTS)
@@ -44,7 +45,7 @@ format: setup ## Format the Python and Rust files
 extension: setup ## Build dist/meniscus-VERSION.zip with Blender's own tool
 	@$(VENV) tools/build_extension.py
 
-$(HOSTS): extension ## Run tests/blender in one Blender (ARGS="-k camera" goes to pytest)
+$(HOSTS): extension ## Run tests/blender or tests/gui in one Blender (ARGS="-k camera" goes to pytest)
 	@$(VENV) tools/hosts.py $@ $(ARGS)
 
 lock: setup ## Pin anew what requirements/*.in ask for, and the wheels in the manifest

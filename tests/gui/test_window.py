@@ -1,18 +1,18 @@
 """The extension in a Blender that has a window: what it draws, and that it leaves Blender's own drawing alone."""
 
 import importlib
-import os
-from pathlib import Path
 
 import bpy
-import numpy as np
 import pytest
+from event_loop import wait_until
+from expected import is_steady
+from pictures import check_same
+from window import settled, viewport
 
 
 @pytest.fixture
-def emitter():
+def emitter(new_file):
     """The active object of a new file, with a particle system and used as fluid."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
     item = bpy.data.objects["Cube"]
     item.modifiers.new("Particles", "PARTICLE_SYSTEM")
     item.meniscus.use_fluid = True
@@ -26,24 +26,9 @@ def properties_editor():
     return next(area for area in screen.areas if area.type == "PROPERTIES")
 
 
-def redraw():
-    window = bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window, screen=window.screen):
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
-
-
-def screenshot():
-    """(height, width, 3) bytes, blue first: what the X server shows. It keeps its screen in an XWD file."""
-    content = Path(os.environ["MENISCUS_SCREEN"]).read_bytes()
-    header_size, _, _, _, width, height, *_ = header = np.frombuffer(content, ">u4", 25).tolist()
-    bytes_per_line, color_count = header[12], header[19]
-    pixels = np.frombuffer(content, np.uint8, bytes_per_line * height, header_size + 12 * color_count)
-    return pixels.reshape(height, bytes_per_line)[:, : 4 * width].reshape(height, width, 4)[..., :3].copy()
-
-
 @pytest.fixture
 def drawn_panels(meniscus, monkeypatch):
-    """The names of the panels that were drawn, closed ones opened."""
+    """The names of the panels that were drawn, closed ones opened: ask for it before the file, which keeps what is open."""
     panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
     names = []
 
@@ -70,23 +55,21 @@ def drawn_panels(meniscus, monkeypatch):
     [("OBJECT", "MENISCUS_PT_object"), ("PARTICLES", "MENISCUS_PT_particles"), ("RENDER", "MENISCUS_PT_scene")],
 )
 @pytest.mark.parametrize("mode", ["PARTICLE", "ATTRIBUTE", "FIXED"])
-def test_panels_draw(emitter, properties_editor, drawn_panels, tab, panel, mode):
+def test_panels_draw(drawn_panels, emitter, properties_editor, tab, panel, mode):
     emitter.meniscus.radius_mode = mode
     emitter.meniscus.color_mode = {"PARTICLE": "LOOK"}.get(mode, mode)
     properties_editor.spaces.active.context = tab
-    redraw()
-    assert panel in drawn_panels
+    properties_editor.tag_redraw()
+    wait_until(lambda: panel in drawn_panels, f"the panel {panel}")
 
 
 def test_rendering_leaves_the_window_as_it_was(meniscus, emitter):
-    # Antialiasing refines the viewport from redraw to redraw.
-    bpy.context.preferences.system.viewport_aa = "OFF"
-    redraw()
-    before = screenshot()
+    shown = viewport()
+    before = settled(shown)
     assert before.std() > 10, "the window should show something"
     balls = meniscus.Balls([[0, 0, 0], [0.5, 0, 0]], 1.0)
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=64, height=48)
     for _ in range(3):
         assert meniscus.render(balls, camera, meniscus.Field(), method="depth_peeling").hit.any()
-    redraw()
-    np.testing.assert_array_equal(screenshot(), before)
+    shown.redraw(2)
+    check_same("rendering", settled(shown), before, is_steady(before), tolerance=0)
