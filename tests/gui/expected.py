@@ -67,7 +67,7 @@ def is_steady(picture: npt.NDArray[np.uint8]) -> Bools:
 
 
 def border_width() -> int:
-    """Pixels at the borders of things that are not compared: Blender on software Vulkan leaves black specks at those of meshes."""
+    """Pixels at borders that are not compared: Blender on software Vulkan leaves black specks at those of meshes."""
     return 3 if gpu.platform.backend_type_get() == "VULKAN" else 1
 
 

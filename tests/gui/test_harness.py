@@ -7,7 +7,7 @@ from event_loop import turns, wait_until
 from expected import box, is_inner, nearest, srgb_bytes
 from mathutils import Euler
 from pictures import check_same
-from window import look, settled, viewport
+from viewports import look, settled, viewport
 
 ROTATION = Euler((1.0, 0.2, 0.5)).to_quaternion()
 

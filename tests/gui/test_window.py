@@ -7,7 +7,7 @@ import pytest
 from event_loop import wait_until
 from expected import is_steady
 from pictures import check_same
-from window import settled, viewport
+from viewports import settled, viewport
 
 
 @pytest.fixture

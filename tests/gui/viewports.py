@@ -103,7 +103,7 @@ def region_picture(window: bpy.types.Window, region: bpy.types.Region) -> Pictur
 
 
 def settled(shown: Viewport, at_rest=lambda: True, seconds: float = DEADLINE) -> Picture:
-    """The picture of a viewport once it changes no more: nothing more is to come (`at_rest`), and it stayed the same for turns."""
+    """The picture of a viewport once it changes no more: nothing more is to come (`at_rest`), and it stays the same."""
     same, last = 0, shown.picture()
 
     def is_settled() -> bool:
