@@ -7,8 +7,9 @@ import pytest
 from blender_fixtures import meniscus, registered_package
 from complaints import complaints
 from event_loop import turns
+from fluid_views import FluidViews
 
-__all__ = ["meniscus", "registered_package", "new_file", "no_complaints"]
+__all__ = ["meniscus", "registered_package", "fluid", "new_file", "no_complaints"]
 
 
 @pytest.fixture(autouse=True)
@@ -29,3 +30,9 @@ def new_file(registered_package):
         bpy.ops.wm.read_homefile(use_factory_startup=True)
     turns(2)  # Blender crashes where regions are hidden before they were first drawn
     return bpy.context.window_manager.windows[0]
+
+
+@pytest.fixture
+def fluid(registered_package):
+    """The fluid in all viewports."""
+    return FluidViews(registered_package)

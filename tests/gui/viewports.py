@@ -12,6 +12,10 @@ from event_loop import DEADLINE, turns, wait_until
 from mathutils import Quaternion
 from pictures import Picture, screen_picture
 
+OVERLAYS = ["floor", "axis_x", "axis_y", "axis_z", "ortho_grid", "cursor", "object_origins", "extras", "relationship_lines"]
+OVERLAYS = [f"show_{name}" for name in (*OVERLAYS, "outline_selected", "text", "annotation")]
+"""All that would be seen. Overlays as such stay on: without them Blender 4.3 has no depth of meshes beside EEVEE's pictures."""
+
 
 @dataclass(frozen=True)
 class Viewport:
@@ -77,7 +81,8 @@ def viewport() -> Viewport:
 
 def make_plain(space: bpy.types.SpaceView3D) -> None:
     """Show the objects alone, each in its own colour, before a background of one colour."""
-    space.overlay.show_overlays = False
+    for name in OVERLAYS:
+        setattr(space.overlay, name, False)
     space.show_gizmo = False
     space.show_region_header = space.show_region_tool_header = space.show_region_toolbar = space.show_region_ui = False
     shading = space.shading
