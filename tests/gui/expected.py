@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import gpu
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 FloatArray = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -47,14 +48,17 @@ def nearest(casters: Sequence[Caster], clip_from_world: FloatArray, width: int, 
     return np.where(np.isfinite(distances.min(axis=0)), distances.argmin(axis=0), -1).reshape(height, width)
 
 
-def is_inner(labels: npt.NDArray[np.integer]) -> Bools:
-    """(height, width): whether all pixels around have the same label, out to the width of a border (`border_width`).
+def is_inner(labels: npt.NDArray[np.generic], width: int | None = None) -> Bools:
+    """(height, width): whether all pixels around have the same label, out to `width`, else that of a border (`border_width`).
 
     Nothing is, in the frame that Blender draws over.
     """
-    width = border_width()
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(labels, width, mode="edge"), (2 * width + 1, 2 * width + 1))
-    inner = (windows == labels[..., None, None]).all(axis=(2, 3))
+    width = border_width() if width is None else width
+    least = greatest = np.pad(labels, width, mode="edge")
+    for axis in (0, 1):
+        least = sliding_window_view(least, 2 * width + 1, axis).min(axis=-1)
+        greatest = sliding_window_view(greatest, 2 * width + 1, axis).max(axis=-1)
+    inner = least == greatest
     inner[:FRAME] = inner[-FRAME:] = inner[:, :FRAME] = inner[:, -FRAME:] = False
     return inner
 

@@ -99,13 +99,27 @@ class FluidViews:
         actual = self.settled(shown)
         check_same(name, actual, with_fluid(actual, np.zeros(actual.shape[:2], np.bool_)), tolerance=PRESENCE_TOLERANCE)
 
+    def is_fluid(self, clip_from_world: FloatArray, shape: Sequence[int]) -> np.ndarray:
+        """(height, width): where there is fluid, with no mesh, at the frame that the open scene has."""
+        return nearest([self.caster()], clip_from_world, shape[1], shape[0]) == 0
+
     def _labels(self, shown: Viewport, meshes: Sequence[Caster]) -> np.ndarray:
         return nearest([self.caster(), *meshes], shown.clip_from_world, shown.region.width, shown.region.height)
+
+
+def is_bluish(colors: np.ndarray) -> np.ndarray:
+    """(height, width): whether a pixel is the fluid and nothing else of a test's scene, whatever way colours are encoded."""
+    return colors[..., 2] > 2 * colors[..., 0]
 
 
 def shows_fluid(picture: Picture) -> np.ndarray:
     """(height, width): whether a pixel has the fluid's colour."""
     return np.abs(picture.astype(int) - srgb_bytes(FLUID_COLOR)).max(axis=2) <= PRESENCE_TOLERANCE
+
+
+def mask(is_set: np.ndarray) -> Picture:
+    """White where it holds, else black."""
+    return np.repeat(np.where(is_set, np.uint8(255), np.uint8(0))[..., None], 3, axis=2)
 
 
 def with_fluid(picture: Picture, is_fluid: np.ndarray) -> Picture:
