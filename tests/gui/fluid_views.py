@@ -29,8 +29,11 @@ class FluidViews:
 
     def __init__(self, package: ModuleType) -> None:
         self._package = package
-        self._viewport = importlib.import_module(f"{package.__name__}.addon.blender.viewport")
-        self.status = importlib.import_module(f"{package.__name__}.addon.blender.viewport_status").STATUS
+        self.status = self.module("viewport_status").STATUS
+
+    def module(self, name: str) -> ModuleType:
+        """A module of the extension's Blender side."""
+        return importlib.import_module(f"{self._package.__name__}.addon.blender.{name}")
 
     def prepare(self) -> Viewport:
         """Let the fluid and the cube have exact colours; the first viewport."""
@@ -43,7 +46,8 @@ class FluidViews:
     def is_at_rest(self) -> bool:
         """Whether all viewports show the best they will show; fails where drawing has failed."""
         assert not self.status.problem, self.status.details or self.status.problem
-        drawn = self._viewport._drawing._viewports.values()
+        drawing = self.module("viewport")._drawing
+        drawn = drawing._viewports.values() if drawing else ()
         return all(shown.live.is_at_rest and shown.drawn == shown.live.revision for shown in drawn)
 
     def settled(self, shown: Viewport) -> Picture:
@@ -53,7 +57,7 @@ class FluidViews:
     def caster(self) -> Caster:
         """The oracle, with the balls that the open scene has at its frame."""
         balls = read_balls(self._package, viewport=True)
-        field = self._package.addon.blender.read_scene.read_field(bpy.context.scene)
+        field = self.module("read_scene").read_field(bpy.context.scene)
 
         def cast(origins: FloatArray, directions: FloatArray) -> FloatArray:
             if len(balls) == 0:
