@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ SUITE = "tests/blender"
 WINDOW_SUITE = "tests/gui"
 # What the tests need beside the installed extension.
 STAGED = ("tests", "samples", "tools/complaints.py", "pyproject.toml")
+NO_TESTS_COLLECTED = 5
 PYTEST_OPTIONS = ["-p", "no:cacheprovider"]
 # The Pythons in the Blenders from 4.2 on.
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
@@ -93,26 +95,47 @@ def run_suite(name: str, pytest_arguments: Sequence[str], report: Path | None = 
         return run_in_bpy(name, pytest_arguments, report)
     with stage_for(name) as stage:
         install_extension(stage)
-        command = [*stage.command, "--background", *script(stage, SUITE, pytest_arguments)]
+        command = [*stage.command, "--background", *script(stage, SUITE, "report.xml", pytest_arguments)]
         status = subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode
-        take_report(stage, report)
+        if report and (stage.folder / "report.xml").is_file():
+            shutil.copy(stage.folder / "report.xml", report)
     return status
 
 
 def run_window_suite(name: str, pytest_arguments: Sequence[str], report: Path | None = None) -> int:
-    """Run tests/gui in a window of a real program that is set up; its exit status, 1 where only stderr complains."""
-    window = windows()[name]
-    with stage_for(window.host) as stage:
+    """Run tests/gui in windows of a real program that is set up, a new one for each file of tests; the exit status.
+
+    It is 1 where nothing is wrong but that a program complained on its standard error.
+    """
+    with stage_for(windows()[name].host) as stage:
         install_extension(stage)
-        command = [*stage.window_command, *window.arguments, *script(stage, WINDOW_SUITE, pytest_arguments)]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
-        sys.stderr.write(done.stderr)
-        take_report(stage, report)
+        files = sorted(file.name for file in (ROOT / WINDOW_SUITE).glob("test_*.py"))
+        statuses = [run_in_window(stage, name, file, pytest_arguments) for file in files]
         take_pictures(stage, PICTURES / name)
+        if report:
+            join_reports(sorted(stage.folder.glob("report-*.xml")), report)
+    ran = [status for status in statuses if status != NO_TESTS_COLLECTED]
+    return max(ran, key=abs) if ran else NO_TESTS_COLLECTED
+
+
+def run_in_window(stage: Stage, name: str, file: str, pytest_arguments: Sequence[str]) -> int:
+    """Run one file of tests; what a program writes to its standard error is shown when it has ended."""
+    arguments = script(stage, f"{WINDOW_SUITE}/{file}", f"report-{file}.xml", pytest_arguments)
+    command = [*stage.window_command, *windows()[name].arguments, *arguments]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+    sys.stderr.write(done.stderr)
     found = complaints(done.stderr)
     if found:
         print(f"Blender complained on its standard error: {'; '.join(found)}", flush=True)
     return done.returncode or int(bool(found))
+
+
+def join_reports(reports: Sequence[Path], target: Path) -> None:
+    """Write the reports of several runs as one."""
+    joined = ElementTree.Element("testsuites")
+    for report in reports:
+        joined.extend(ElementTree.parse(report).getroot())
+    ElementTree.ElementTree(joined).write(target)
 
 
 def run_in_bpy(name: str, pytest_arguments: Sequence[str], report: Path | None) -> int:
@@ -130,18 +153,15 @@ def install_extension(stage: Stage) -> None:
     run([*stage.command, "--command", "extension", "install-file", "-r", "user_default", "-e", zip_inside])
 
 
-def script(stage: Stage, tests: str, pytest_arguments: Sequence[str]) -> list[str]:
-    """The arguments with which a program in which the extension was enabled at an earlier start runs tests."""
+def script(stage: Stage, tests: str, report: str, pytest_arguments: Sequence[str]) -> list[str]:
+    """The arguments with which a program in which the extension was enabled at an earlier start runs tests.
+
+    The report is a file in the stage.
+    """
     inside = stage.path_inside
     suite = [f"{inside}/{tests}", "--rootdir", inside, "-c", f"{inside}/pyproject.toml", *PYTEST_OPTIONS]
-    suite += ["--junitxml", f"{inside}/report.xml", *pytest_arguments]
+    suite += ["--junitxml", f"{inside}/{report}", *pytest_arguments]
     return ["--python-exit-code", "1", "--python", f"{inside}/tests/run_in_blender.py", "--", f"{inside}/sites", *suite]
-
-
-def take_report(stage: Stage, report: Path | None) -> None:
-    """Copy pytest's report out of the stage."""
-    if report and (stage.folder / "report.xml").is_file():
-        shutil.copy(stage.folder / "report.xml", report)
 
 
 def take_pictures(stage: Stage, folder: Path) -> None:

@@ -28,7 +28,6 @@ from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
-NO_TESTS_COLLECTED = 5
 
 
 @dataclass
@@ -117,7 +116,7 @@ def native_suite(name: str, toolchain: Future[dict[str, str]] | None = None) -> 
         return missing_suite(name, error)
     outcome = native_tests.run_suite(name)
     result = Result(name, outcome.passed, outcome.failed, outcome.skipped)
-    return judged(result, outcome.status if outcome.passed + outcome.failed else outcome.status or NO_TESTS_COLLECTED)
+    return judged(result, outcome.status if outcome.passed + outcome.failed else outcome.status or hosts.NO_TESTS_COLLECTED)
 
 
 def missing_suite(name: str, error: ToolError) -> Result:
@@ -148,7 +147,7 @@ def result_of(name: str, status: int) -> Result:
 
 def judged(result: Result, status: int) -> Result:
     """The result of a suite that ended with this exit status, which has the last word."""
-    if status == NO_TESTS_COLLECTED:
+    if status == hosts.NO_TESTS_COLLECTED:
         result.problem = "no test was found"
     elif status and not result.failed:
         result.problem = f"ended with exit status {status}"

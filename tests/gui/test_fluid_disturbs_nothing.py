@@ -73,12 +73,29 @@ def test_the_interface_around_the_fluid_is_as_without_it(fluid, drop):
 
 def test_memory_stays_flat(fluid, drop):
     small = shrunk(drop)
-    orbit(small, 200)
-    before = resident_megabytes()
-    orbit(small, 1000)
-    growth = resident_megabytes() - before
+    orbit(small, 400)
+    growth = growth_of_orbiting(small, 1000) - 1000 * own_growth(small)
     assert growth < MOST_GROWTH, f"{growth:.1f} MB more after a thousand redraws"
     fluid.check_presence("after_a_thousand_redraws", small)
+
+
+def own_growth(shown, count=300):
+    """Megabytes a redraw that Blender grows by itself: 0.1 on software Vulkan, where it crashes after 3,000 redraws."""
+    if gpu.platform.backend_type_get() != "VULKAN":
+        return 0.0
+    settings = bpy.data.objects["Drop"].meniscus
+    settings.use_fluid = False
+    turns(3)
+    growth = growth_of_orbiting(shown, count)
+    settings.use_fluid = True
+    return growth / count
+
+
+def growth_of_orbiting(shown, count):
+    """Megabytes that the process grows by."""
+    before = resident_megabytes()
+    orbit(shown, count)
+    return resident_megabytes() - before
 
 
 def shrunk(shown):
