@@ -15,8 +15,11 @@ from gl_state import StateReader, changes
 from pictures import check_same, screen_picture
 from viewports import Viewport, settled
 
+REDRAWS = 1000
 MOST_GROWTH = 8.0
-"""Megabytes in a thousand redraws."""
+"""Megabytes in so many redraws, on software Vulkan beyond those by which Blender grows there by itself, some 100."""
+
+BLOCK = 100
 
 
 @pytest.fixture
@@ -73,29 +76,24 @@ def test_the_interface_around_the_fluid_is_as_without_it(fluid, drop):
 
 def test_memory_stays_flat(fluid, drop):
     small = shrunk(drop)
-    orbit(small, 400)
-    growth = growth_of_orbiting(small, 1000) - 1000 * own_growth(small)
-    assert growth < MOST_GROWTH, f"{growth:.1f} MB more after a thousand redraws"
-    fluid.check_presence("after_a_thousand_redraws", small)
-
-
-def own_growth(shown, count=300):
-    """Megabytes a redraw that Blender grows by itself: 0.1 on software Vulkan, where it crashes after 3,000 redraws."""
-    if gpu.platform.backend_type_get() != "VULKAN":
-        return 0.0
     settings = bpy.data.objects["Drop"].meniscus
+    orbit(small, 200)
     settings.use_fluid = False
-    turns(3)
-    growth = growth_of_orbiting(shown, count)
+    own = growth_of_orbiting(small, 600) if gpu.platform.backend_type_get() == "VULKAN" else [0.0]
     settings.use_fluid = True
-    return growth / count
+    blocks = growth_of_orbiting(small, REDRAWS)
+    growth = REDRAWS / BLOCK * (np.median(blocks) - np.median(own))
+    assert growth < MOST_GROWTH, f"{growth:.1f} MB more after {REDRAWS} redraws: {blocks}, without fluid {own}"
+    fluid.check_presence("after_many_redraws", small)
 
 
 def growth_of_orbiting(shown, count):
-    """Megabytes that the process grows by."""
-    before = resident_megabytes()
-    orbit(shown, count)
-    return resident_megabytes() - before
+    """Megabytes that the process grows by in each block of redraws; a few have jumps, up and down."""
+    sizes = [resident_megabytes()]
+    for _ in range(count // BLOCK):
+        orbit(shown, BLOCK)
+        sizes.append(resident_megabytes())
+    return np.diff(sizes).tolist()
 
 
 def shrunk(shown):
