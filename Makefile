@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures bench-viewport lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -34,6 +34,9 @@ bench-peers: setup ## Time what users have today beside Meniscus, and judge both
 
 bench-pictures: setup ## Render the pictures of docs/kanamori_2008.md anew (ARGS="--only figure_1")
 	@PYTHONPATH=tests $(VENV) -m bench.paper_pictures $(ARGS)
+
+bench-viewport: extension ## Time the viewport in real windows with 120,000 particles (ARGS="--windows blender-5.2-vulkan")
+	@PYTHONPATH=tests:tools $(VENV) -m bench.viewport $(ARGS)
 
 lint: setup ## Check style, format, types, import rules and shaders
 	@$(VENV) tools/lint.py

@@ -46,9 +46,19 @@ class FluidViews:
     def is_at_rest(self) -> bool:
         """Whether all viewports show the best they will show; fails where drawing has failed."""
         assert not self.status.problem, self.status.details or self.status.problem
+        return self.shows_newest() and all(live.is_at_rest for live in self.lives())
+
+    def shows_newest(self) -> bool:
+        """Whether no viewport has yet to draw what it has."""
+        return all(shown.drawn == shown.live.revision for shown in self._shown())
+
+    def lives(self) -> list:
+        """The live view of each viewport that shows fluid."""
+        return [shown.live for shown in self._shown()]
+
+    def _shown(self) -> list:
         drawing = self.module("viewport")._drawing
-        drawn = drawing._viewports.values() if drawing else ()
-        return all(shown.live.is_at_rest and shown.drawn == shown.live.revision for shown in drawn)
+        return list(drawing._viewports.values()) if drawing else []
 
     def settled(self, shown: Viewport) -> Picture:
         """The picture of a viewport once it changes no more."""
