@@ -7,6 +7,7 @@ from blender_fixtures import EXTENSION
 from event_loop import turns
 from fluid_scenes import add_points
 from mathutils import Euler
+from recorder import recording
 from viewports import Viewport, look
 
 
@@ -80,6 +81,10 @@ def test_an_error_in_the_draw_handler_is_shown_once_and_pauses_drawing(fluid, dr
         assert len(calls) == 1, "drawing should pause"
         assert "broken on purpose" in fluid.status.problem
         assert "ZeroDivisionError" in fluid.status.details
+        turns(100)
+        with recording() as recorder:
+            turns(50)
+        assert len(recorder.drawn) <= 1, "nothing should be drawn again while drawing pauses"
     bpy.data.objects["Drop"].location.x = 1.0
     turns()
     fluid.check_presence("after_the_error", drop)
