@@ -1,10 +1,11 @@
 # Any Python 3 can set the rest up; see tools/environments.py.
 PYTHON ?= python3
 VENV := .venv/bin/python
-HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own
+HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
+	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo test test-fast fuzz bench bench-peers bench-pictures bench-viewport lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -34,6 +35,9 @@ bench-peers: setup ## Time what users have today beside Meniscus, and judge both
 bench-pictures: setup ## Render the pictures of docs/kanamori_2008.md anew (ARGS="--only figure_1")
 	@PYTHONPATH=tests $(VENV) -m bench.paper_pictures $(ARGS)
 
+bench-viewport: extension ## Time the viewport in real windows with 120,000 particles (ARGS="--windows blender-5.2-vulkan")
+	@PYTHONPATH=tests:tools $(VENV) -m bench.viewport $(ARGS)
+
 lint: setup ## Check style, format, types, import rules and shaders
 	@$(VENV) tools/lint.py
 
@@ -44,7 +48,7 @@ format: setup ## Format the Python and Rust files
 extension: setup ## Build dist/meniscus-VERSION.zip with Blender's own tool
 	@$(VENV) tools/build_extension.py
 
-$(HOSTS): extension ## Run tests/blender in one Blender (ARGS="-k camera" goes to pytest)
+$(HOSTS): extension ## Run tests/blender or tests/gui in one Blender (ARGS="-k camera" goes to pytest)
 	@$(VENV) tools/hosts.py $@ $(ARGS)
 
 lock: setup ## Pin anew what requirements/*.in ask for, and the wheels in the manifest

@@ -7,7 +7,7 @@ from environments import ENVIRONMENTS, ensure_uv, uv_variables
 from project import REQUIREMENTS, ToolError, command_line, run
 
 # Lists that no environment of ours is made of; they serve several Pythons, the oldest decides.
-OTHER_LOCKS = {"uv.txt": "3.9", "extension.txt": "3.11", "pytest.txt": "3.11"}
+OTHER_LOCKS = {"uv.txt": "3.9", "extension.txt": "3.11", "program.txt": "3.11"}
 
 
 def locks() -> dict[str, str]:

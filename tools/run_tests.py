@@ -28,7 +28,6 @@ from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
-NO_TESTS_COLLECTED = 5
 
 
 @dataclass
@@ -54,9 +53,9 @@ def run_all() -> list[Result]:
         results += [native_suite(name) for name in native_tests.stable_suites()]
         results += [native_suite(name, nightly) for name in native_tests.NIGHTLY_SUITES]
         results.append(check("extension", lambda: build_after(wheels)))
-        results += [host_suite(name, name, setup, hosts.run_suite) for name, setup in ready.items()]
-        windows = {name: ready[name] for name in hosts.window_names()}
-        results += [host_suite(f"{name}-window", name, setup, hosts.run_window_suite) for name, setup in windows.items()]
+        results += [host_suite(name, setup, hosts.run_suite) for name, setup in ready.items()]
+        windows = {name: ready[window.host] for name, window in hosts.windows().items()}
+        results += [host_suite(name, setup, hosts.run_window_suite) for name, setup in windows.items()]
     return results
 
 
@@ -92,15 +91,15 @@ def pytest_suite(name: str, *options: str) -> Result:
     return result_of(name, status)
 
 
-def host_suite(name: str, host: str, setup: Future[None], run_suite: Callable[[str, Sequence[str], Path], int]) -> Result:
-    """Run a suite in a host, once that is set up."""
+def host_suite(name: str, setup: Future[None], run_suite: Callable[[str, Sequence[str], Path], int]) -> Result:
+    """Run the suite of a host or of a window, once that is set up."""
     announce(f"Blender tests: {name}")
     try:
         setup.result()
     except ToolError as error:
         return missing_suite(name, error)
     try:
-        status = run_suite(host, ["-q"], report_of(name))
+        status = run_suite(name, ["-q"], report_of(name))
     except ToolError as error:
         print(error, flush=True)
         return Result(name, failed=1, problem=str(error).splitlines()[0])
@@ -117,7 +116,7 @@ def native_suite(name: str, toolchain: Future[dict[str, str]] | None = None) -> 
         return missing_suite(name, error)
     outcome = native_tests.run_suite(name)
     result = Result(name, outcome.passed, outcome.failed, outcome.skipped)
-    return judged(result, outcome.status if outcome.passed + outcome.failed else outcome.status or NO_TESTS_COLLECTED)
+    return judged(result, outcome.status if outcome.passed + outcome.failed else outcome.status or hosts.NO_TESTS_COLLECTED)
 
 
 def missing_suite(name: str, error: ToolError) -> Result:
@@ -148,7 +147,7 @@ def result_of(name: str, status: int) -> Result:
 
 def judged(result: Result, status: int) -> Result:
     """The result of a suite that ended with this exit status, which has the last word."""
-    if status == NO_TESTS_COLLECTED:
+    if status == hosts.NO_TESTS_COLLECTED:
         result.problem = "no test was found"
     elif status and not result.failed:
         result.problem = f"ended with exit status {status}"

@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 import pytest
 from gpu_extras.batch import batch_for_shader
-from window import redraw, screenshot
+from viewports import Viewport
 
 TEXTURE_BINDING_2D = 0x8069
 # Framebuffers, viewport, scissor, program, vertex array, buffers, units, depth, culling, blending, stencil, polygons, pixels.
@@ -166,18 +166,13 @@ def pictures(drawing, fluid):
     for is_shown in (True, False):
         bpy.data.objects["Cube"].hide_set(not is_shown)
         redraw()
-        seen.append(screenshot()[viewport_pixels()])
+        seen.append(Viewport().picture())
     return seen
 
 
-def viewport_pixels():
-    """Rows and columns of a screenshot, from above, that the 3D viewport fills."""
-    window = bpy.context.window_manager.windows[0]
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    # Without its headers and their rounded corners.
-    top, bottom = window.height - region.y - region.height + 60, window.height - region.y - 20
-    return slice(top, bottom), slice(region.x + 60, region.x + region.width - 20)
+def redraw(times=2):
+    """Draw the viewport so often."""
+    Viewport().redraw(times)
 
 
 def test_the_picture_is_the_one_that_is_read_back_and_meshes_hide_and_are_hidden(drawing):
@@ -229,9 +224,8 @@ def test_other_windows_and_other_files_share_too(drawing):
     redraw()
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         bpy.ops.wm.window_new()
-    for window in bpy.context.window_manager.windows:
-        with bpy.context.temp_override(window=window, screen=window.screen):
-            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=2)
+    for index in range(2):
+        Viewport(index).redraw(2)
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.wm.window_close()
     redraw()
@@ -245,7 +239,7 @@ def test_where_copying_fails_the_picture_comes_through_memory(meniscus, drawing,
     textures = importlib.import_module(f"{package}.gpu_shaders.surface_textures")
     errors = importlib.import_module(f"{package}.addon.fluid.errors")
     redraw()
-    expected = screenshot()
+    expected = Viewport().picture()
 
     def fail(_):
         raise errors.DeviceError("no such copy")
@@ -253,6 +247,6 @@ def test_where_copying_fails_the_picture_comes_through_memory(meniscus, drawing,
     monkeypatch.setattr(textures.SurfaceTextures, "copy_to_attachments", fail)
     drawing.kinds.clear()
     redraw()
-    np.testing.assert_array_equal(screenshot(), expected)
+    np.testing.assert_array_equal(Viewport().picture(), expected)
     assert drawing.kinds == ["DeviceImage", *["ImageBuffers"] * (len(drawing.kinds) - 1)]
     assert drawing._sharing.SHARING.problem.endswith("no such copy")

@@ -3,15 +3,16 @@
 import importlib
 
 import bpy
-import numpy as np
 import pytest
-from window import redraw, screenshot
+from event_loop import wait_until
+from expected import is_steady
+from pictures import check_same
+from viewports import settled, viewport
 
 
 @pytest.fixture
-def emitter():
+def emitter(new_file):
     """The active object of a new file, with a particle system and used as fluid."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
     item = bpy.data.objects["Cube"]
     item.modifiers.new("Particles", "PARTICLE_SYSTEM")
     item.meniscus.use_fluid = True
@@ -27,7 +28,7 @@ def properties_editor():
 
 @pytest.fixture
 def drawn_panels(meniscus, monkeypatch):
-    """The names of the panels that were drawn, closed ones opened."""
+    """The names of the panels that were drawn, closed ones opened: ask for it before the file, which keeps what is open."""
     panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
     names = []
 
@@ -54,23 +55,21 @@ def drawn_panels(meniscus, monkeypatch):
     [("OBJECT", "MENISCUS_PT_object"), ("PARTICLES", "MENISCUS_PT_particles"), ("RENDER", "MENISCUS_PT_scene")],
 )
 @pytest.mark.parametrize("mode", ["PARTICLE", "ATTRIBUTE", "FIXED"])
-def test_panels_draw(emitter, properties_editor, drawn_panels, tab, panel, mode):
+def test_panels_draw(drawn_panels, emitter, properties_editor, tab, panel, mode):
     emitter.meniscus.radius_mode = mode
     emitter.meniscus.color_mode = {"PARTICLE": "LOOK"}.get(mode, mode)
     properties_editor.spaces.active.context = tab
-    redraw()
-    assert panel in drawn_panels
+    properties_editor.tag_redraw()
+    wait_until(lambda: panel in drawn_panels, f"the panel {panel}")
 
 
 def test_rendering_leaves_the_window_as_it_was(meniscus, emitter):
-    # Antialiasing refines the viewport from redraw to redraw.
-    bpy.context.preferences.system.viewport_aa = "OFF"
-    redraw()
-    before = screenshot()
+    shown = viewport()
+    before = settled(shown)
     assert before.std() > 10, "the window should show something"
     balls = meniscus.Balls([[0, 0, 0], [0.5, 0, 0]], 1.0)
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=64, height=48)
     for _ in range(3):
         assert meniscus.render(balls, camera, meniscus.Field(), method="depth_peeling").hit.any()
-    redraw()
-    np.testing.assert_array_equal(screenshot(), before)
+    shown.redraw(2)
+    check_same("rendering", settled(shown), before, is_steady(before), tolerance=0)

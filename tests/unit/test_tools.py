@@ -1,12 +1,15 @@
 """The tools that set up and test: what goes wrong there must be noticed."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import debian_blender
 import environments
+import hosts
 import project
 import pytest
 import run_tests
+from complaints import complaints
 
 
 def report(path: Path, **counts: int) -> None:
@@ -83,3 +86,40 @@ def test_mounts_are_found():
 def test_what_fails_is_one_sentence_with_the_command():
     with pytest.raises(project.ToolError, match="This command failed: sh -c echo broken"):
         project.output_of(["sh", "-c", "echo broken >&2; exit 2"])
+
+
+def test_reports_of_several_runs_count_together(reports):
+    for number in (1, 2):
+        report(reports / f"part-{number}.xml", tests=3, failures=number)
+    hosts.join_reports(sorted(reports.glob("part-*.xml")), reports / "window.xml")
+    result = run_tests.result_of("window", 1)
+    assert (result.passed, result.failed) == (3, 3)
+
+
+@pytest.mark.parametrize(("statuses", "expected"), [([0, 5], 0), ([5, 5], 5), ([0, 1], 1), ([0, -11, 5], -11)])
+def test_the_worst_status_of_a_window_suite_counts(tmp_path, monkeypatch, statuses, expected):
+    left = iter(statuses)
+    stage = hosts.Stage(tmp_path, "/stage", ["blender"], ["blender"])
+    (tmp_path / "pictures").mkdir()
+    for index in range(len(statuses)):
+        (tmp_path / hosts.WINDOW_SUITE).mkdir(parents=True, exist_ok=True)
+        (tmp_path / hosts.WINDOW_SUITE / f"test_{index}.py").touch()
+    monkeypatch.setattr(hosts, "ROOT", tmp_path)
+    monkeypatch.setattr(hosts, "PICTURES", tmp_path / "out")
+    monkeypatch.setattr(hosts, "stage_for", lambda host: nullcontext(stage))
+    monkeypatch.setattr(hosts, "install_extension", lambda stage: None)
+    monkeypatch.setattr(hosts, "run_in_window", lambda *_: next(left))
+    assert hosts.run_window_suite("blender-5.2-vulkan", []) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("Saved session recovery\nBlender quit\n", 0),
+        ("Traceback (most recent call last):\n  File ...\nValueError: x\n", 1),
+        ("GPUShader: linking error\nGL_INVALID_OPERATION in glDraw\n", 2),
+        ("Error: Not freed memory blocks: 3, total 0.1 MB\n", 1),
+    ],
+)
+def test_what_a_blender_must_not_say_is_found(text, count):
+    assert len(complaints(text)) == count
