@@ -6,12 +6,21 @@ import zlib
 from collections.abc import Iterable
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
-from ..fluid.look import Look
+from ..fluid.look import LOOK_STYLES, Look
 from ..render.registry import method_infos
+from .changes import note_setting
 
 Item = tuple[str, str, str]
 NumberedItem = tuple[str, str, str, int]
@@ -45,6 +54,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         name="Use as Fluid",
         description="Draw the particles or points of this object as a blended surface",
         default=False,
+        update=note_setting,
     )
     source: EnumProperty(
         name="Source",
@@ -55,6 +65,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("POINTS", "Points", "Mesh vertices and point clouds, also those that Geometry Nodes make", 2),
         ),
         default="AUTO",
+        update=note_setting,
     )
     radius_mode: EnumProperty(
         name="Radius",
@@ -65,6 +76,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("FIXED", "Fixed", "The same radius for all", 2),
         ),
         default="PARTICLE",
+        update=note_setting,
     )
     radius_factor: FloatProperty(
         name="Factor",
@@ -73,11 +85,13 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_min=0.5,
         soft_max=8.0,
+        update=note_setting,
     )
     radius_attribute: StringProperty(
         name="Attribute",
         description="Name of the attribute on points that holds the influence radius, in the object's space",
         default="radius",
+        update=note_setting,
     )
     radius: FloatProperty(
         name="Radius",
@@ -87,6 +101,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         soft_min=0.001,
         subtype="DISTANCE",
         unit="LENGTH",
+        update=note_setting,
     )
     weight: FloatProperty(
         name="Weight",
@@ -94,6 +109,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         default=1.0,
         soft_min=-2.0,
         soft_max=2.0,
+        update=note_setting,
     )
     color_mode: EnumProperty(
         name="Color",
@@ -104,6 +120,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("ATTRIBUTE", "Attribute", "A colour on each point", 2),
         ),
         default="LOOK",
+        update=note_setting,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -113,22 +130,49 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
+        update=note_setting,
     )
     color_attribute: StringProperty(
         name="Attribute",
         description="Name of the colour attribute on points",
         default="Color",
+        update=note_setting,
     )
 
 
 class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     """The surface of all the balls of a scene, and how it is drawn."""
 
+    use_viewport: BoolProperty(
+        name="Show in Viewports",
+        description="Draw the fluid in the 3D viewports",
+        default=True,
+        update=note_setting,
+    )
+    preview_samples: IntProperty(
+        name="Samples",
+        description="Antialiasing of viewports at rest: how many samples a pixel gets; 1 for none",
+        default=8,
+        min=1,
+        max=64,
+        update=note_setting,
+    )
+    preview_frame_rate: IntProperty(
+        name="Frame Rate",
+        description="Images a second that viewports try to hold while the view or the fluid moves, with fewer pixels if need be",
+        default=24,
+        min=1,
+        max=240,
+        soft_min=10,
+        soft_max=60,
+        update=note_setting,
+    )
     kernel: EnumProperty(
         name="Kernel",
         description="How the density of a ball falls from its centre to its influence radius",
         items=stable_items((kernel.name, kernel.label, kernel.description) for kernel in KERNELS.values()),
         default=Field().kernel,
+        update=note_setting,
     )
     isovalue: FloatProperty(
         name="Isovalue",
@@ -138,18 +182,28 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_min=0.01,
         soft_max=1.0,
         precision=3,
+        update=note_setting,
     )
     method: EnumProperty(
         name="Method",
         description="How the surface is found",
         items=stable_items(method_items()),
         default="auto",
+        update=note_setting,
     )
     backend: EnumProperty(
         name="Device",
         description="What computes the image",
         items=stable_items(BACKENDS),
         default="auto",
+        update=note_setting,
+    )
+    style: EnumProperty(
+        name="Look",
+        description="How the surface is coloured",
+        items=stable_items((style.name, style.label, style.description) for style in LOOK_STYLES.values()),
+        default=Look().style,
+        update=note_setting,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -159,6 +213,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
+        update=note_setting,
     )
     ambient: FloatProperty(
         name="Ambient",
@@ -167,6 +222,73 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
+        update=note_setting,
+    )
+    roughness: FloatProperty(
+        name="Roughness",
+        description="How dull the surface is: 0 is a mirror",
+        default=Look().roughness,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=note_setting,
+    )
+    light: FloatVectorProperty(
+        name="Light",
+        description="Where the key light comes from: x to the right, y up, z towards the viewer",
+        default=Look().light,
+        size=3,
+        subtype="DIRECTION",
+        update=note_setting,
+    )
+    light_strength: FloatProperty(
+        name="Strength",
+        description="Factor of all light",
+        default=Look().light_strength,
+        min=0.0,
+        soft_max=4.0,
+        update=note_setting,
+    )
+    absorption: FloatProperty(
+        name="Absorption",
+        description="How much light each Blender unit of fluid takes away, most of the colours that the surface colour lacks",
+        default=Look().absorption,
+        min=0.0,
+        soft_max=20.0,
+        update=note_setting,
+    )
+    ior: FloatProperty(
+        name="IOR",
+        description="Index of refraction: 1.33 is water, 1 bends nothing",
+        default=Look().ior,
+        min=1.0,
+        max=3.0,
+        precision=3,
+        update=note_setting,
+    )
+    use_speed_range: BoolProperty(
+        name="Fixed Range",
+        description="Give the speeds at the ends of the colour map instead of 0 and the speed of the fastest ball",
+        default=False,
+        update=note_setting,
+    )
+    speed_min: FloatProperty(
+        name="Slow",
+        description="Speed at the lower end of the colour map",
+        default=0.0,
+        min=0.0,
+        subtype="VELOCITY",
+        unit="VELOCITY",
+        update=note_setting,
+    )
+    speed_max: FloatProperty(
+        name="Fast",
+        description="Speed at the upper end of the colour map",
+        default=5.0,
+        min=0.0,
+        subtype="VELOCITY",
+        unit="VELOCITY",
+        update=note_setting,
     )
     depth_contrast: FloatProperty(
         name="Depth Contrast",
@@ -175,6 +297,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=100.0,
         soft_max=10.0,
+        update=note_setting,
     )
     depth_contrast_radius: FloatProperty(
         name="Contrast Radius",
@@ -185,6 +308,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_max=0.2,
         precision=3,
         subtype="FACTOR",
+        update=note_setting,
     )
 
 

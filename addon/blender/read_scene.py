@@ -59,8 +59,15 @@ def read_look(scene: bpy.types.Scene) -> Look:
     """The colour and light that the scene's settings describe."""
     settings = scene.meniscus
     return Look(
+        style=settings.style,
         color=tuple(settings.color),
         ambient=settings.ambient,
+        roughness=settings.roughness,
+        light=tuple(settings.light),
+        light_strength=settings.light_strength,
+        absorption=settings.absorption,
+        ior=settings.ior,
+        speed_range=(settings.speed_min, settings.speed_max) if settings.use_speed_range else None,
         depth_contrast=settings.depth_contrast,
         depth_contrast_radius=settings.depth_contrast_radius,
     )
