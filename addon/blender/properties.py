@@ -277,7 +277,6 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         description="Speed at the lower end of the colour map",
         default=0.0,
         min=0.0,
-        subtype="VELOCITY",
         unit="VELOCITY",
         update=note_setting,
     )
@@ -286,7 +285,6 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         description="Speed at the upper end of the colour map",
         default=5.0,
         min=0.0,
-        subtype="VELOCITY",
         unit="VELOCITY",
         update=note_setting,
     )
