@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..addon.fluid.errors import DeviceError
@@ -25,10 +25,19 @@ class Source:
         Paths by the source-string number of the ``#line`` directives.
     """
 
-    def __init__(self, path: str, constants: Mapping[str, object], version: int = 330) -> None:
+    def __init__(
+        self, path: str, constants: Mapping[str, object] | None = None, version: int = 330, declarations: Sequence[str] = ()
+    ) -> None:
         self.files: list[str] = []
-        defines = [f"#define {name} {value}" for name, value in constants.items()]
-        self.text = "\n".join([f"#version {version} core", *defines, *self._lines(path)]) + "\n"
+        self._constants = [f"#define {name} {value}" for name, value in (constants or {}).items()]
+        self._lines_of_files = self._lines(path)
+        self.text = "\n".join([f"#version {version} core", *self._constants, *declarations, *self._lines_of_files]) + "\n"
+
+    @property
+    def body(self) -> str:
+        """The text for compilers that declare what goes in and out themselves, and take no numbers of lines."""
+        lines = (line for line in self._lines_of_files if not line.startswith("#line "))
+        return "\n".join([*self._constants, *lines]) + "\n"
 
     def _lines(self, path: str) -> list[str]:
         """The lines of `path` (below gpu_shaders/), each include in place of its first mention."""

@@ -27,6 +27,8 @@ from system_packages import TEST_PROGRAMS, ensure_test_programs
 from meniscus.addon.render.registry import method_infos
 from meniscus.gpu_shaders.glsl import Source, explain
 from meniscus.gpu_shaders.programs import ProgramSource
+from meniscus.gpu_shaders.viewport.programs import ViewportProgram
+from meniscus.gpu_shaders.viewport.programs import all_programs as viewport_programs
 
 SHADERS = ROOT / "gpu_shaders"
 VALIDATOR = "glslangValidator"
@@ -51,7 +53,7 @@ def method_programs() -> list[ProgramSource]:
     return [program for module in modules for program in module.all_programs()]
 
 
-def compiler_findings(programs: Iterable[ProgramSource]) -> list[str]:
+def compiler_findings(programs: Iterable[ProgramSource | ViewportProgram]) -> list[str]:
     """What the reference compiler says against programs, with the names of our files."""
     sources = [program.sources() for program in programs]
     # Many constants matter to few shaders.
@@ -164,7 +166,7 @@ def check_shaders() -> None:
     """Check all shader files; ToolError with what was found."""
     found = rule_violations(shader_files())
     if has_validator():
-        found += compiler_findings(method_programs())
+        found += compiler_findings([*method_programs(), *viewport_programs()])
     if found:
         raise ToolError("the shaders have faults.\n" + "\n".join(found))
 

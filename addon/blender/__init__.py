@@ -6,7 +6,7 @@ import atexit
 import importlib
 from types import ModuleType
 
-_SUBMODULES = ("properties", "panels", "changes", "command_line")
+_SUBMODULES = ("properties", "preferences", "panels", "changes", "command_line", "viewport")
 """What has something to register, in the order of registering."""
 
 

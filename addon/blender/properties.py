@@ -159,7 +159,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
     preview_frame_rate: IntProperty(
         name="Frame Rate",
-        description="Images a second that viewports try to hold while the view or the fluid moves, with fewer pixels if need be",
+        description="Images a second that viewports try to hold while something moves, with fewer pixels if need be",
         default=24,
         min=1,
         max=240,

@@ -73,20 +73,20 @@ def textures_of(image: ImageBuffers | DeviceImage) -> Textures:
     An image on the graphics processor is given back there, and can be asked for once.
     """
     if isinstance(image, ImageBuffers):
-        return {name: _uploaded(pixels) for name, pixels in image.passes.items()}
+        return {name: uploaded(pixels) for name, pixels in image.passes.items()}
     surface = image.surface
     try:
         textures = {name: gpu.types.GPUTexture(surface.size, format=_format(name == "depth")) for name in surface.passes}
         with gpu.types.GPUFrameBuffer(color_slots=list(textures.values())).bind():
             surface.copy_to_attachments()
     except DeviceError as error:
-        textures = {name: _uploaded(pixels) for name, pixels in surface.read_back().items()}
+        textures = {name: uploaded(pixels) for name, pixels in surface.read_back().items()}
         SHARING.give_up(error)
     surface.release()
     return textures
 
 
-def _uploaded(pixels: npt.NDArray[np.float32]) -> gpu.types.GPUTexture:
+def uploaded(pixels: npt.NDArray[np.float32]) -> gpu.types.GPUTexture:
     """(height, width) or (height, width, 3) as a texture."""
     height, width = pixels.shape[:2]
     if pixels.ndim == 3:

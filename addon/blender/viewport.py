@@ -23,11 +23,12 @@ from ..render.live_view import LiveRenderer, LiveView, View
 from ..render.method import timed
 from .changes import CHANGES
 from .preferences import preferences
-from .presenter import Presenter, PresentView
+from .presenter import Place, Presenter
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
 from .texture_sharing import SHARING
 from .view_camera import ViewCamera, view_camera
+from .view_transform import DisplayTransform, ViewTransforms
 from .viewport_status import STATUS
 
 LONGEST_WAIT = 0.045
@@ -82,6 +83,7 @@ class ViewportDrawing:
         self._scene_balls = SceneBalls(CHANGES)
         self._viewports: dict[int, _Viewport] = {}
         self._dropped: list[_Viewport] = []
+        self._transforms = ViewTransforms()
         self._pause: _Pause | None = None
         # Blender knows a timer by its address, and a bound method has a new one each time.
         self._timer = self._tick
@@ -143,7 +145,7 @@ class ViewportDrawing:
             SHARING.begin()
         viewport.live.show(view)
         viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
-        self._present(viewport, look, seen)
+        self._present(viewport, look, seen, self._transforms.of(context.scene, context.space_data.shading))
         self._report(viewport, balls)
 
     def _viewport(self, key: int) -> _Viewport:
@@ -151,16 +153,16 @@ class ViewportDrawing:
             self._viewports[key] = _Viewport(self._renderer.open())
         return self._viewports[key]
 
-    def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera) -> None:
+    def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera, transform: DisplayTransform) -> None:
         is_new = viewport.drawn != viewport.live.revision
         viewport.drawn = viewport.live.revision
         pictures = viewport.live.pictures
         if pictures:
             milliseconds: dict[str, float] = {}
             shown = pictures[0].view.camera
-            place = PresentView(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window))
+            place = Place(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window))
             with timed(milliseconds, "present"):
-                viewport.presenter.draw(pictures, look, place)
+                viewport.presenter.draw(pictures, look, transform, place)
             if is_new:
                 viewport.live.note_presenting(pictures[-1], milliseconds["present"] / 1e3)
 
@@ -172,15 +174,18 @@ class ViewportDrawing:
 
     def _tick(self) -> float | None:
         """Have those viewports redrawn for which there is something new; seconds until the next look, None for no more."""
+        has_transforms = self._transforms.has_missing
+        self._transforms.make_missing()
         regions = {region.as_pointer(): (region, area) for region, area in _view_regions()}
         for key in self._viewports.keys() - regions.keys():
             self._drop(key)
-        is_busy = STATUS.has_news
+        is_busy = STATUS.has_news or has_transforms
         for key, viewport in self._viewports.items():
             region, area = regions[key]
-            if viewport.drawn != viewport.live.revision:
+            has_pictures = self._pause is None and viewport.drawn != viewport.live.revision
+            if has_pictures or has_transforms:
                 region.tag_redraw()
-            is_busy |= not viewport.live.is_at_rest or viewport.drawn != viewport.live.revision
+            is_busy |= has_pictures or not viewport.live.is_at_rest
             if STATUS.has_news:
                 _redraw_sidebar(area)
         STATUS.has_news = False

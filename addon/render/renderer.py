@@ -264,7 +264,7 @@ def _colors(surface: Surface, hit: npt.NDArray[np.bool_], look: Look) -> npt.NDA
     """(height, width, 3) linear Rec.709; the look's colour where the balls have none, 0 where there is no hit."""
     if surface.color is not None:
         return surface.color
-    return hit[..., None] * np.array(look.color, np.float32)
+    return np.where(hit[..., None], np.array(look.color, np.float32), np.float32(0))
 
 
 def _velocities(surface: Surface) -> npt.NDArray[np.float32]:

@@ -39,7 +39,8 @@ class FluidViews:
         """Let the fluid and the cube have exact colours; the first viewport."""
         scene = bpy.context.scene
         scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
-        scene.meniscus.look, scene.meniscus.color = "flat", FLUID_COLOR
+        scene.meniscus.style, scene.meniscus.color = "flat", FLUID_COLOR
+        scene.meniscus.preview_samples = 1  # else gaps between balls show, in pixels whose centres are in the fluid
         bpy.data.objects["Cube"].color = (*CUBE_COLOR, 1)
         return viewport()
 
