@@ -22,6 +22,9 @@ from .view_transform import TABLE_SIZE, DisplayTransform
 
 FloatArray = npt.NDArray[np.float64]
 
+_UNCHANGED = DisplayTransform()
+"""For colours that stand for numbers."""
+
 _CORNERS = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
 
 
@@ -53,6 +56,7 @@ class _Sample:
 
     picture: Picture
     textures: Textures
+    thickness: gpu.types.GPUTexture | None
 
 
 @dataclass
@@ -79,6 +83,8 @@ class Presenter:
 
         Blender's state of drawing is left as it was found.
         """
+        if LOOK_STYLES[look.style].is_data:
+            transform = _UNCHANGED
         before = _State()
         try:
             self._take(pictures)
@@ -95,13 +101,15 @@ class Presenter:
         """Upload what is new; samples of another view are dropped."""
         known = len(self._samples)
         if [sample.picture for sample in self._samples] != list(pictures[:known]):
-            self._samples, self._sum, known = [], None, 0
-        self._samples += [_Sample(picture, textures_of(picture.image)) for picture in pictures[known:]]
+            self._samples, self._shaded_as, known = [], None, 0
+        self._samples += map(_uploaded_sample, pictures[known:])
 
     def _shade(self, look: Look, transform: DisplayTransform) -> None:
         # Transforms are equal only where they are the same.
-        if self._sum is None or self._shaded_as != (look, transform):
-            self._sum, self._shaded_as = _new_sum(self._samples[0].textures["depth"]), (look, transform)
+        if self._shaded_as != (look, transform):
+            self._begin_sum(self._samples[0].textures["depth"])
+            self._shaded_as = look, transform
+        assert self._sum is not None
         program = self._program(SHADE)
         for sample in self._samples[self._sum.count :]:
             gpu.state.blend_set("ADDITIVE_PREMULT" if self._sum.count else "NONE")
@@ -110,6 +118,14 @@ class Presenter:
             with self._sum.framebuffer.bind():
                 program.draw(_shade_params(sample, look, transform), self._shade_textures(sample, look, transform))
             self._sum.count += 1
+
+    def _begin_sum(self, like: gpu.types.GPUTexture) -> None:
+        """The first sample overwrites what is in the texture, which is used again where it has the size."""
+        if self._sum is not None and (self._sum.texture.width, self._sum.texture.height) == (like.width, like.height):
+            self._sum.count = 0
+            return
+        texture = gpu.types.GPUTexture((like.width, like.height), format="RGBA16F")
+        self._sum = _Sum(texture, gpu.types.GPUFrameBuffer(color_slots=[texture]))
 
     def _show(self, place: Place) -> None:
         assert self._sum is not None
@@ -132,7 +148,7 @@ class Presenter:
             "depth_tx": depth,
             "normal_tx": sample.textures["normal"],
             "value_tx": values[0] if values else depth,
-            "thickness_tx": depth,
+            "thickness_tx": sample.thickness or depth,
             "table_tx": self._table_texture(transform) or depth,
         }
 
@@ -151,19 +167,26 @@ class _Program:
         self._shader = _compiled(source)
         self._batch = batch_for_shader(self._shader, "TRI_STRIP", {"corner": _CORNERS})
         self._params: gpu.types.GPUUniformBuf | None = None
+        self._numbers: npt.NDArray[np.float32] | None = None
 
     def draw(self, params: npt.NDArray[np.float32], textures: Textures) -> None:
         """Draw the quad; `params` (n, 4) are the vectors of the structure, matrices by columns."""
-        data = gpu.types.Buffer("FLOAT", params.size, np.ascontiguousarray(params, np.float32).reshape(-1))
-        if self._params is None:
-            self._params = gpu.types.GPUUniformBuf(data)
-        else:
-            self._params.update(data)
+        self._upload(params)
         self._shader.bind()
         for name, texture in textures.items():
             self._shader.uniform_sampler(name, texture)
         self._shader.uniform_block("params", self._params)
         self._batch.draw(self._shader)
+
+    def _upload(self, params: npt.NDArray[np.float32]) -> None:
+        if self._numbers is not None and np.array_equal(params, self._numbers):
+            return
+        data = gpu.types.Buffer("FLOAT", params.size, params.reshape(-1))
+        if self._params is None:
+            self._params = gpu.types.GPUUniformBuf(data)
+        else:
+            self._params.update(data)
+        self._numbers = params
 
 
 def _compiled(source: ViewportProgram) -> gpu.types.GPUShader:
@@ -188,6 +211,11 @@ def _compiled(source: ViewportProgram) -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
+def _uploaded_sample(picture: Picture) -> _Sample:
+    thickness = None if picture.thickness is None else uploaded(picture.thickness)
+    return _Sample(picture, textures_of(picture.image), thickness)
+
+
 class _State:
     """What of Blender's state of drawing is changed here."""
 
@@ -201,11 +229,6 @@ class _State:
         gpu.state.depth_mask_set(self._mask)
 
 
-def _new_sum(like: gpu.types.GPUTexture) -> _Sum:
-    texture = gpu.types.GPUTexture((like.width, like.height), format="RGBA16F")
-    return _Sum(texture, gpu.types.GPUFrameBuffer(color_slots=[texture]))
-
-
 def _shade_params(sample: _Sample, look: Look, transform: DisplayTransform) -> npt.NDArray[np.float32]:
     """(12, 4): shade_params.glsl."""
     picture, camera = sample.picture, sample.picture.image.camera
@@ -213,12 +236,17 @@ def _shade_params(sample: _Sample, look: Look, transform: DisplayTransform) -> n
     vectors = [
         *camera.world_from_view.T,
         (window.left, window.bottom, window.right, window.top),
-        (*look.light, look.light_strength),
+        (*look.light_direction, look.light_strength),
         (look.absorption, look.ior, 0.0, 0.0),
         (*look.color, float("color" in sample.textures)),
         (*picture.depth_range, *(look.speed_range or picture.speed_range)),
         (look.ambient, look.roughness, list(LOOK_STYLES).index(look.style), float(camera.is_perspective)),
-        (2**transform.exposure, 1 / transform.gamma, 0 if transform.table is None else TABLE_SIZE, 0.0),
+        (
+            2**transform.exposure,
+            1 / transform.gamma,
+            0 if transform.table is None else TABLE_SIZE,
+            float(sample.thickness is not None),
+        ),
     ]
     return np.array(vectors, np.float32)
 

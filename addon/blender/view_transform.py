@@ -17,14 +17,14 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float32]
 Key = tuple[object, ...]
 
-TABLE_SIZE = 33
+TABLE_SIZE = 65
 """Colours along each axis of a table."""
 
-_LOW, _HIGH, _OFFSET = -8.0, 8.0, 1 / 256
-"""The axes of a table are ``log2(light + offset)``, as in lib/display.glsl."""
+_LOW, _HIGH, _OFFSET = -6.0, 14 / 3, 1 / 63
+"""The axes of a table are ``log2((light + offset) / (1 + offset))``, from 0 to 25, as in lib/display.glsl. 1 is in the table."""
 
 _PLAIN: Key = ("sRGB", "Standard", "None", None, None)
-"""Display, view transform, look, white balance, curves: what needs no table."""
+"""What needs no table: display, view transform, look, white balance, and curves with the exposure."""
 
 _MOST_TRANSFORMS = 32
 
@@ -106,8 +106,11 @@ def _taken_settings(scene: bpy.types.Scene, shading: bpy.types.View3DShading) ->
     if not uses_all:
         return (display, view.view_transform, view.look, *_PLAIN[3:]), 0.0, 1.0
     white_balance = (view.white_balance_temperature, view.white_balance_tint) if _has_white_balance(view) else None
-    curves = _curves(view.curve_mapping) if view.use_curve_mapping else None
-    return (display, view.view_transform, view.look, white_balance, curves), view.exposure, view.gamma
+    if not view.use_curve_mapping:
+        return (display, view.view_transform, view.look, white_balance, None), view.exposure, view.gamma
+    # Curves come before the exposure, which is then in the table.
+    curves = (_curves(view.curve_mapping), view.exposure)
+    return (display, view.view_transform, view.look, white_balance, curves), 0.0, view.gamma
 
 
 def _uses_scene(shading: bpy.types.View3DShading) -> bool:
@@ -129,7 +132,7 @@ def _curves(mapping: bpy.types.CurveMapping) -> Key:
 
 def _table_colors() -> FloatArray:
     """Scene-linear colours of the table's cells, in its layout."""
-    axis = np.exp2(np.linspace(_LOW, _HIGH, TABLE_SIZE)) - _OFFSET
+    axis = np.exp2(np.linspace(_LOW, _HIGH, TABLE_SIZE)) * (1 + _OFFSET) - _OFFSET
     blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
     return np.stack([red, green, blue], -1).astype(np.float32).reshape(TABLE_SIZE, TABLE_SIZE**2, 3)
 
@@ -159,7 +162,7 @@ def _set_up(converter: bpy.types.Scene, scene: bpy.types.Scene, key: Key) -> Non
         view.use_white_balance = True
         view.white_balance_temperature, view.white_balance_tint = white_balance
     if curves is not None:
-        view.use_curve_mapping = True
+        view.use_curve_mapping, view.exposure = True, curves[1]
         _copy_curves(scene.view_settings.curve_mapping, view.curve_mapping)
     image = converter.render.image_settings
     image.file_format, image.color_mode, image.color_depth, image.compression = "PNG", "RGB", "16", 0

@@ -210,6 +210,7 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
         seen.camera.cropped(),
         read_field(scene),
         passes=("depth", "normal", *wanted),
+        uses_thickness=LOOK_STYLES[look.style].uses_thickness,
         method=settings.method,
         backend=chosen.backend if settings.backend == "auto" else settings.backend,
         threads=chosen.threads,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from .errors import InputError
 
@@ -21,6 +24,8 @@ class LookStyle:
         Whether it needs the length of the way through the fluid.
     uses_scene
         Whether it shows what is behind the fluid.
+    is_data
+        Whether its colours stand for numbers, so that no view transform may change them.
     """
 
     name: str
@@ -29,6 +34,7 @@ class LookStyle:
     passes: tuple[str, ...] = ()
     uses_thickness: bool = False
     uses_scene: bool = False
+    is_data: bool = False
 
 
 LOOK_STYLES: dict[str, LookStyle] = {
@@ -45,12 +51,22 @@ LOOK_STYLES: dict[str, LookStyle] = {
         ),
         LookStyle("headlight", "Headlight", "Light from the eye, for measuring and for plain prints", ("color",)),
         LookStyle("flat", "Flat", "The colour of the balls, without light", ("color",)),
-        LookStyle("normal", "Normal", "The direction of the surface as a colour, in world space"),
-        LookStyle("depth", "Depth", "Light where the surface is near, dark where it is far"),
-        LookStyle("speed", "Speed", "The speed of the balls as a colour map", ("velocity",)),
-        LookStyle("id", "ID", "A colour for each ball, which it keeps over time", ("ball_id",)),
+        LookStyle("normal", "Normal", "The direction of the surface as a colour, in world space", is_data=True),
+        LookStyle("depth", "Depth", "Light where the surface is near, dark where it is far", is_data=True),
+        LookStyle("speed", "Speed", "The speed of the balls as a colour map", ("velocity",), is_data=True),
+        LookStyle("id", "ID", "A colour for each ball, which it keeps over time", ("ball_id",), is_data=True),
     )
 }
+
+
+SPEED_COLORS = ((0.011, 0.016, 0.133), (0.014, 0.133, 0.456), (0.033, 0.448, 0.342), (0.521, 0.730, 0.102), (1.0, 0.93, 0.52))
+"""From slow to fast at even steps, linear Rec.709; each is lighter than the one before."""
+
+
+def look_constants() -> dict[str, object]:
+    """What shaders know of the looks by name: the number of each style, and the colours of speeds."""
+    styles = {f"STYLE_{name.upper()}": number for number, name in enumerate(LOOK_STYLES)}
+    return styles | {f"SPEED_{number}": f"vec3{color}" for number, color in enumerate(SPEED_COLORS)}
 
 
 @dataclass(frozen=True)
@@ -68,7 +84,7 @@ class Look:
     roughness
         0 is a mirror, 1 is dull (studio, water).
     light
-        (3,) unit vector towards the key light, in view space: x to the right, y up, z to the eye (studio, water).
+        (3,) vector towards the key light, in view space: x to the right, y up, z to the eye (studio, water).
     light_strength
         Factor of all light (studio, water).
     absorption
@@ -89,7 +105,7 @@ class Look:
     Raises
     ------
     InputError
-        A number of the depth contrast is unusable.
+        The style is unknown, or a number is unusable.
     """
 
     style: str = "studio"
@@ -105,6 +121,16 @@ class Look:
     depth_contrast_radius: float = 0.04
 
     def __post_init__(self) -> None:
+        if self.style not in LOOK_STYLES:
+            raise InputError(f"Unknown look '{self.style}': choose from {', '.join(LOOK_STYLES)}")
+        if not (np.isfinite(self.light).all() and np.any(self.light)):
+            raise InputError("The direction of the light must not be zero: turn the light in the look's settings")
+        for name, least, greatest in _LIMITS:
+            if not least <= getattr(self, name) <= greatest:
+                label = name.replace("_", " ")
+                raise InputError(f"The {label} of the look must be from {least:g} to {greatest:g}, not {getattr(self, name)}")
+        if self.speed_range is not None and not 0 <= self.speed_range[0] < self.speed_range[1] < math.inf:
+            raise InputError("The lower end of the speeds must be less than the upper one: change the range of the speeds")
         if not 0 <= self.depth_contrast <= 100:
             raise InputError(f"The depth contrast must be from 0 (none) to 100, not {self.depth_contrast}")
         if not 0 < self.depth_contrast_radius <= 1:
@@ -112,3 +138,18 @@ class Look:
                 f"The radius of the depth contrast must be greater than 0 and at most 1 (the image's height), "
                 f"not {self.depth_contrast_radius}"
             )
+
+    @property
+    def light_direction(self) -> tuple[float, float, float]:
+        """Unit vector towards the key light, in view space."""
+        x, y, z = np.asarray(self.light, np.float64) / np.linalg.norm(self.light)
+        return float(x), float(y), float(z)
+
+
+_LIMITS = (
+    ("ambient", 0.0, 1.0),
+    ("roughness", 0.0, 1.0),
+    ("light_strength", 0.0, 1e6),
+    ("absorption", 0.0, 1e6),
+    ("ior", 1.0, 10.0),
+)

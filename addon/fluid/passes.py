@@ -38,7 +38,7 @@ DEPTH_BACKGROUND = 1e10
 PASSES: dict[str, Pass] = {
     image_pass.name: image_pass
     for image_pass in (
-        Pass("combined", "Combined", "RGBA", 0.0, True, "Headlight shading, premultiplied alpha"),
+        Pass("combined", "Combined", "RGBA", 0.0, True, "The surface as the look shades it, premultiplied alpha"),
         Pass("depth", "Depth", "Z", DEPTH_BACKGROUND, False, "Planar distance from the camera, Blender units"),
         Pass("normal", "Normal", "XYZ", 0.0, False, "Unit normal that points out of the fluid, world space"),
         Pass("position", "Position", "XYZ", 0.0, False, "Position of the surface, world space"),

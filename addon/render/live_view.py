@@ -12,6 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Condition, Thread
 
+import numpy as np
+import numpy.typing as npt
+
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, MeniscusError
@@ -21,6 +24,7 @@ from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
 from .renderer import render_to_show
+from .thickness import thickness_image
 
 SETTLE_SECONDS = 0.06
 """How long a view must stay the same before it is refined: longer than from one image to the next while it moves."""
@@ -40,6 +44,8 @@ class View:
         As for :func:`renderer.render`; the camera has the full resolution and no region.
     passes
         What is needed of the surface.
+    uses_thickness
+        Whether the length of the way through the fluid is needed.
     method, backend, threads
         As for :func:`renderer.render`.
     samples
@@ -54,6 +60,7 @@ class View:
     camera: Camera
     field: Field
     passes: tuple[str, ...] = ("depth", "normal")
+    uses_thickness: bool = False
     method: str = "auto"
     backend: str = "auto"
     threads: int = 0
@@ -67,8 +74,11 @@ class View:
             other is not None
             and self.balls is other.balls
             and self.camera.is_same(other.camera)
-            and (self.field, self.passes, self.method, self.backend) == (other.field, other.passes, other.method, other.backend)
+            and self._means() == other._means()
         )
+
+    def _means(self) -> tuple[object, ...]:
+        return self.field, self.passes, self.uses_thickness, self.method, self.backend
 
     @property
     def most_pictures(self) -> int:
@@ -89,6 +99,8 @@ class Picture:
         Depth, normal and what else the view asks for; its camera has the size of the image.
     view
         What it shows.
+    thickness
+        (height, width) at a resolution of its own, see :func:`thickness.thickness_image`; None where it is not needed.
     depth_range
         The least and the greatest planar depth at which there can be fluid, Blender units.
     speed_range
@@ -97,6 +109,7 @@ class Picture:
 
     image: ImageBuffers | DeviceImage
     view: View
+    thickness: npt.NDArray[np.float32] | None = None
 
     @property
     def depth_range(self) -> tuple[float, float]:
@@ -281,6 +294,7 @@ class LiveRenderer:
                     is_cancelled=is_cancelled,
                     threads=view.threads,
                 )
+                thickness = thickness_image(view.balls, camera, view.field) if view.uses_thickness else None
         except CancelledError:
             return
         except Exception as failure:  # noqa: BLE001 - whatever it is, the user sees it and the thread goes on
@@ -291,7 +305,7 @@ class LiveRenderer:
             return
         with self._changed:
             if is_first or view.shows_the_same(live._view):
-                live._accept(Picture(image, view), milliseconds["picture"] / 1e3)
+                live._accept(Picture(image, view, thickness), milliseconds["picture"] / 1e3)
                 self._changed.notify_all()
 
     def _is_overtaken(self, live: LiveView, view: View) -> bool:

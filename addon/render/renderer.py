@@ -14,20 +14,21 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
-from ..fluid.look import Look
+from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES, checked_passes
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .registry import create_method, method_infos, runs_in_software_opengl
-from .shading import headlight
+from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
+from .thickness import at_pixels, thickness_image
 
 Element = TypeVar("Element", np.float32, np.bool_)
 
 BACKENDS = ("auto", "gpu", "cpu")
 
 # What a pass needs beside depth and normal.
-_NEEDED: dict[str, Attribute] = {"combined": "color", "color": "color", "velocity": "velocity", "ball_id": "ball"}
+_NEEDED: dict[str, Attribute] = {"color": "color", "velocity": "velocity", "ball_id": "ball"}
 
 
 def render(
@@ -156,11 +157,13 @@ class _Shot:
         names = checked_passes(passes)
         if threads < 0:
             raise InputError(f"The number of threads must be 0 (one a core) or more, not {threads}")
-        attributes = frozenset(_NEEDED[name] for name in names if name in _NEEDED)
+        look = look or Look()
+        needed = {*names, *(LOOK_STYLES[look.style].passes if "combined" in names else ())}
+        attributes = frozenset(_NEEDED[name] for name in needed if name in _NEEDED)
         info, runner = _pick_method(method, backend, attributes)
         watch = _watch(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)
-        return cls(info, runner, request, camera, names, look or Look())
+        return cls(info, runner, request, camera, names, look)
 
     @property
     def can_stay_on_device(self) -> bool:
@@ -202,10 +205,41 @@ class _Shot:
         }
 
     def _combined(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-        look, importance = self.look, None
-        if look.depth_contrast > 0:
-            importance = spatial_importance(surface.depth, hit, self.camera, look.depth_contrast_radius)
-        return headlight(surface.normal, self.request.camera, surface.color, hit, look, importance)
+        """(height, width, 4): the look, with depth contrast."""
+        request, look = self.request, self.look
+        rgba = np.zeros((*hit.shape, 4), np.float32)
+        if not hit.any():
+            return rgba
+        ranges = Ranges(request.camera.depth_range(request.balls.bounds), (0.0, request.balls.fastest))
+        rgba[hit] = shaded(self._points(surface, hit), look, ranges)
+        return rgba
+
+    def _points(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> SurfacePoints:
+        """What is hit, as the look needs it."""
+        camera, balls = self.request.camera, self.request.balls
+        uses_thickness = LOOK_STYLES[self.look.style].uses_thickness
+        thickness = thickness_image(balls, camera, self.request.field) if uses_thickness else np.zeros((1, 1), np.float32)
+        return SurfacePoints(
+            normal=view_normals(surface.normal[hit], camera),
+            to_eye=directions_to_eye(camera, hit),
+            up=camera.world_from_view[2, :3].astype(np.float32),
+            world_normal=surface.normal[hit],
+            base=_colors(surface, hit, self.look)[hit],
+            velocity=_velocities(surface)[hit],
+            depth=surface.depth[hit],
+            ball=_ball_ids(surface, balls, hit)[hit],
+            thickness=at_pixels(thickness, camera, hit),
+            contrast=self._contrast(surface, hit)[hit],
+        )
+
+    def _contrast(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+        """(height, width): the factor by which depth contrast changes the light."""
+        look = self.look
+        if look.depth_contrast == 0:
+            return np.ones(hit.shape, np.float32)
+        importance = spatial_importance(surface.depth, hit, self.request.camera, look.depth_contrast_radius)
+        # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
+        return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> tuple[MethodInfo, Method]:

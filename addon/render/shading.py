@@ -1,61 +1,250 @@
-"""The Combined pass: a plain headlight."""
+"""The looks: the colours of the Combined pass. gpu_shaders/lib/shading.glsl has the same formulas, for the viewports."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from ..fluid.camera import Camera
-from ..fluid.look import Look
+from ..fluid.look import SPEED_COLORS, Look
+
+FloatArray = npt.NDArray[np.float32]
+
+DIELECTRIC = 0.04
+"""What most materials reflect of light that falls straight on them."""
 
 
-def headlight(
-    normal: npt.NDArray[np.float32],
-    camera: Camera,
-    color: npt.NDArray[np.float32] | None,
-    hit: npt.NDArray[np.bool_],
-    look: Look,
-    importance: npt.NDArray[np.float32] | None = None,
-) -> npt.NDArray[np.float32]:
-    """Light from the eye on a diffuse surface; both of its sides are lit.
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points of the surface that are shaded, (count,) or (count, 3) each.
 
-    Parameters
+    Attributes
     ----------
-    normal
-        (height, width, 3), unit, world space, of the camera's whole image.
-    camera
-        Where the light comes from; it has no region.
-    color
-        (height, width, 3) linear Rec.709, None: the look's colour.
-    hit
-        (height, width): where there is a surface.
-    importance
-        (height, width), see :func:`depth_contrast.spatial_importance`; None: the light stays as it is.
+    normal, to_eye, up
+        Unit, view space: x to the right, y up, z to the eye. `up` (3,) is the zenith of the world.
+    world_normal
+        Unit, world space.
+    base
+        Linear Rec.709.
+    velocity
+        World space, Blender units a second.
+    depth
+        Planar, Blender units.
+    ball
+        Ids.
+    thickness
+        Length of the way through the fluid, Blender units.
+    contrast
+        Factor of the light.
+    """
+
+    normal: FloatArray
+    to_eye: FloatArray
+    up: FloatArray
+    world_normal: FloatArray
+    base: FloatArray
+    velocity: FloatArray
+    depth: FloatArray
+    ball: FloatArray
+    thickness: FloatArray
+    contrast: FloatArray
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What depths and speeds are shown between: the least and the greatest each."""
+
+    depth: tuple[float, float]
+    speed: tuple[float, float]
+
+
+def shaded(points: SurfacePoints, look: Look, ranges: Ranges) -> FloatArray:
+    """Colours of points as the look wants them.
 
     Returns
     -------
-    (height, width, 4) float32: linear Rec.709, premultiplied alpha.
+    (count, 4) float32: linear Rec.709, premultiplied alpha.
     """
-    light = np.abs(_cosines(normal, camera))
-    light *= 1 - look.ambient
-    light += look.ambient
-    if importance is not None:
-        # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
-        light *= 1 + np.tanh(look.depth_contrast * importance)
-    light *= hit
-    rgba = np.empty((*hit.shape, 4), np.float32)
-    for channel, value in enumerate(look.color):
-        np.multiply(light, value if color is None else color[..., channel], out=rgba[..., channel])
-    rgba[..., 3] = hit
+    faces_away = _dot(points.normal, points.to_eye) < 0
+    normal = np.where(faces_away[:, None], -points.normal, points.normal)
+    rgba: FloatArray = _STYLES[look.style](points, look, ranges, normal)
     return rgba
 
 
-def _cosines(normal: npt.NDArray[np.float32], camera: Camera) -> npt.NDArray[np.float32]:
-    """(height, width): of the angles between normals and rays, negative where the surface faces the eye."""
-    right, up, backward = camera.world_from_view[:3, :3].astype(np.float32).T
-    cosines: npt.NDArray[np.float32] = normal @ -backward
+def view_normals(normal: FloatArray, camera: Camera) -> FloatArray:
+    """World-space normals (count, 3) in view space."""
+    return np.asarray(normal @ camera.world_from_view[:3, :3].astype(np.float32))
+
+
+def directions_to_eye(camera: Camera, hit: npt.NDArray[np.bool_]) -> FloatArray:
+    """(count, 3) unit, view space: from the surface to the eye, at the pixels (height, width) of a whole image that are hit."""
+    rows, columns = np.nonzero(hit)
+    toward = np.zeros((len(rows), 3), np.float32)
+    toward[:, 2] = 1
     if camera.is_perspective:
-        x, y = (centers.astype(np.float32) for centers in camera.pixel_centers())
-        cosines += x * (normal @ right) + y[:, None] * (normal @ up)
-        cosines /= np.sqrt(1 + x**2 + (y**2)[:, None])
-    return cosines
+        x, y = camera.pixel_centers()
+        toward[:, 0], toward[:, 1] = -x[columns], -y[rows]
+        toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    return toward
+
+
+def _opaque(color: FloatArray) -> FloatArray:
+    return np.concatenate([color, np.ones_like(color[:, :1])], axis=1, dtype=np.float32)
+
+
+def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.asarray((first * second).sum(axis=-1), np.float32)
+
+
+def _mix(low: npt.ArrayLike, high: npt.ArrayLike, share: FloatArray) -> FloatArray:
+    """(count, 3) between two colours."""
+    return np.asarray(low, np.float32) + share[:, None] * (np.asarray(high, np.float32) - np.asarray(low, np.float32))
+
+
+def _smoothstep(low: float, high: float, value: FloatArray) -> FloatArray:
+    place = np.clip((value - low) / (high - low), 0, 1)
+    return np.asarray(place * place * (3 - 2 * place))
+
+
+def _reflected(to_eye: FloatArray, normal: FloatArray) -> FloatArray:
+    return np.asarray(2 * _dot(normal, to_eye)[:, None] * normal - to_eye)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _highlight(normal: FloatArray, to_eye: FloatArray, light: FloatArray, roughness: float) -> FloatArray:
+    """Trowbridge and Reitz's distribution of facets (GGX), with the usual approximation of what they hide (Karis 2013)."""
+    between = _unit(to_eye + light)
+    alpha = max(roughness * roughness, 0.002)
+    spread = np.maximum(_dot(normal, between), 0) ** 2 * (alpha * alpha - 1) + 1
+    near = np.maximum(_dot(light, between), 0.1)
+    facets = alpha * alpha / (4 * np.pi * spread * spread * near * near * (alpha + 0.5))
+    return np.asarray(np.minimum(facets * np.maximum(_dot(normal, light), 0), 16))
+
+
+def _schlick(cosine: FloatArray, straight: float) -> FloatArray:
+    return np.asarray(straight + (1 - straight) * (1 - np.clip(cosine, 0, 1)) ** 5)
+
+
+def _fresnel(cosine: FloatArray, ior: float) -> FloatArray:
+    """What of unpolarized light a smooth surface reflects."""
+    within = np.sqrt(np.maximum(1 - (1 - cosine**2) / ior**2, 0))
+    across = (cosine - ior * within) / (cosine + ior * within)
+    along = (ior * cosine - within) / (ior * cosine + within)
+    return np.asarray(0.5 * (across**2 + along**2))
+
+
+def _studio_room(direction: FloatArray, light: FloatArray, roughness: float) -> FloatArray:
+    """A studio: floor and ceiling, and a soft box around the key light."""
+    room = _mix((0.10, 0.10, 0.11), (0.55, 0.60, 0.68), _smoothstep(-0.6, 0.9, direction[:, 1]))
+    blur = 0.04 + 0.5 * roughness
+    box = _smoothstep(0.86 - blur, 0.86 + blur, _dot(direction, light))
+    return np.asarray(room + box[:, None] * (1 - 0.6 * roughness) * np.array([1.9, 1.85, 1.75], np.float32))
+
+
+def _studio(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
+    light = np.array(look.light_direction, np.float32)
+    key = np.clip((_dot(normal, light) + 0.25) / 1.25, 0, 1)
+    from_below = _unit(np.array([-light[0], -0.35, 0.55], np.float32))
+    fill = np.clip(_dot(normal, from_below), 0, 1)
+    soft = _mix((0.45, 0.42, 0.40), (0.85, 0.92, 1.0), 0.5 + 0.5 * normal[:, 1])
+    diffuse = (0.95 * key * key)[:, None] * np.array([1.0, 0.97, 0.92], np.float32)
+    diffuse = (1 - look.ambient) * (diffuse + (0.18 * fill)[:, None] * np.array([0.7, 0.85, 1.0], np.float32))
+    mirrored = _reflected(points.to_eye, normal)
+    share = _schlick(_dot(normal, points.to_eye), DIELECTRIC) * (1 - 0.7 * look.roughness)
+    gloss = share[:, None] * _studio_room(mirrored, light, look.roughness)
+    shine = _schlick(_dot(light, _unit(light + points.to_eye)), DIELECTRIC)
+    gloss += (shine * _highlight(normal, points.to_eye, light, look.roughness))[:, None]
+    color = points.base * ((0.3 + look.ambient) * soft + diffuse) + gloss
+    return _opaque((look.light_strength * points.contrast)[:, None] * color)
+
+
+def _sky(up: FloatArray) -> FloatArray:
+    """Over open ground; `up` (count,) are the cosines to the zenith."""
+    above = _mix((0.80, 0.86, 0.92), (0.20, 0.40, 0.75), np.clip(up, 0, 1) ** 0.6)
+    ground = np.array([0.16, 0.17, 0.16], np.float32)
+    return np.asarray(ground + _smoothstep(-0.25, 0.05, up)[:, None] * (above - ground))
+
+
+def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
+    reflected = _fresnel(np.maximum(_dot(normal, points.to_eye), 1e-3), look.ior)
+    sun = _highlight(normal, points.to_eye, np.array(look.light_direction, np.float32), 0.05 + 0.6 * look.roughness)
+    mirrored = _reflected(points.to_eye, normal)
+    mirrored = _unit(mirrored + look.roughness**2 * (normal - mirrored))
+    base = np.clip(points.base, 0, 1)
+    passes = np.exp(-look.absorption * points.thickness[:, None] * (1 - base))
+    lit = 0.5 * _sky(0.5 + 0.5 * _dot(normal, points.up))
+    within = (1 - reflected)[:, None] * (1 - passes) * base * lit
+    color = reflected[:, None] * _sky(_dot(mirrored, points.up)) + (12 * reflected * sun)[:, None] + within
+    rgba = np.empty((len(color), 4), np.float32)
+    rgba[:, :3] = (look.light_strength * points.contrast)[:, None] * color
+    rgba[:, 3] = 1 - (1 - reflected) * passes.mean(axis=1)
+    return rgba
+
+
+def _headlight(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
+    light = look.ambient + (1 - look.ambient) * _dot(normal, points.to_eye)
+    return _opaque((points.contrast * light)[:, None] * points.base)
+
+
+def _flat(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> FloatArray:
+    return _opaque(points.base)
+
+
+def _normal(points: SurfacePoints, _look: Look, _ranges: Ranges, _turned: FloatArray) -> FloatArray:
+    return _opaque((0.5 + 0.5 * np.clip(points.world_normal, -1, 1)) ** 2.2)
+
+
+def _depth(points: SurfacePoints, _look: Look, ranges: Ranges, _normal: FloatArray) -> FloatArray:
+    light = (1 - 0.9 * _share_of_range(points.depth, ranges.depth)) ** 2.2
+    return _opaque(np.repeat(light[:, None], 3, axis=1))
+
+
+def _speed(points: SurfacePoints, look: Look, ranges: Ranges, _normal: FloatArray) -> FloatArray:
+    speeds = np.linalg.norm(points.velocity, axis=1)
+    return _opaque(speed_colors(_share_of_range(speeds, look.speed_range or ranges.speed)))
+
+
+def speed_colors(place: FloatArray) -> FloatArray:
+    """(count, 3) linear Rec.709: colours from slow, 0, to fast, 1."""
+    knots = np.linspace(0, 1, len(SPEED_COLORS))
+    channels = (np.interp(place, knots, channel) for channel in np.array(SPEED_COLORS).T)
+    return np.stack(list(channels), axis=-1).astype(np.float32)
+
+
+def _id(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> FloatArray:
+    number = _scrambled(np.maximum(points.ball, 0).astype(np.uint32))
+    hue = (number & 65535) / np.float32(65536) * 6
+    saturation = 0.5 + 0.45 * ((number >> 16) & 255) / np.float32(255)
+    value = 0.7 + 0.3 * (number >> 24) / np.float32(255)
+    pure = np.clip(np.abs((hue[:, None] + np.array([0, 4, 2], np.float32)) % 6 - 3) - 1, 0, 1)
+    color = value[:, None] * (1 + saturation[:, None] * (pure - 1))
+    return _opaque(color * color)
+
+
+def _scrambled(number: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """A permuted congruential generator's step (O'Neill 2014)."""
+    state = number * np.uint32(747796405) + np.uint32(2891336453)
+    word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
+    return np.asarray((word >> np.uint32(22)) ^ word)
+
+
+def _share_of_range(value: FloatArray, ends: tuple[float, float]) -> FloatArray:
+    return np.asarray(np.clip((value - ends[0]) / max(ends[1] - ends[0], 1e-12), 0, 1), np.float32)
+
+
+_STYLES: dict[str, Callable[[SurfacePoints, Look, Ranges, FloatArray], FloatArray]] = {
+    "studio": _studio,
+    "water": _water,
+    "headlight": _headlight,
+    "flat": _flat,
+    "normal": _normal,
+    "depth": _depth,
+    "speed": _speed,
+    "id": _id,
+}

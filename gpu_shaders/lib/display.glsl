@@ -1,8 +1,8 @@
 // The way from scene-linear colours to the display, by Blender's view transform as a table of code values.
 // The table's axes are logarithms; view_transform.py makes it.
-const float TABLE_LOW = -8.0;
-const float TABLE_HIGH = 8.0;
-const float TABLE_OFFSET = 0.00390625;
+const float TABLE_LOW = -6.0;
+const float TABLE_HIGH = 14.0 / 3.0;
+const float TABLE_OFFSET = 1.0 / 63.0;
 
 vec3 decoded(vec3 code) {
     vec3 low = code / 12.92;
@@ -22,7 +22,8 @@ vec3 table_cell(ivec3 cell, int size) {
 }
 
 vec3 in_table(vec3 light, int size) {
-    vec3 place = (log2(max(light, vec3(0.0)) + TABLE_OFFSET) - TABLE_LOW) / (TABLE_HIGH - TABLE_LOW);
+    vec3 above_zero = (max(light, vec3(0.0)) + TABLE_OFFSET) / (1.0 + TABLE_OFFSET);
+    vec3 place = (log2(above_zero) - TABLE_LOW) / (TABLE_HIGH - TABLE_LOW);
     vec3 position = clamp(place, 0.0, 1.0) * float(size - 1);
     ivec3 low = min(ivec3(position), ivec3(size - 2));
     vec3 share = position - vec3(low);

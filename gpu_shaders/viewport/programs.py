@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...addon.fluid.look import look_constants
 from ..glsl import Source
 
 
@@ -25,6 +26,8 @@ class ViewportProgram:
         Names of the vec2 values that go from the vertex shader to the fragment shader.
     writes_depth
         Whether the fragment shader writes ``gl_FragDepth``.
+    constants
+        Names and values of the ``#define`` lines of the fragment shader.
     """
 
     name: str
@@ -32,6 +35,7 @@ class ViewportProgram:
     samplers: tuple[str, ...]
     varyings: tuple[str, ...] = ()
     writes_depth: bool = False
+    constants: tuple[tuple[str, object], ...] = ()
 
     @property
     def structure(self) -> str:
@@ -49,11 +53,16 @@ class ViewportProgram:
         fragment += [*(f"in vec2 {name};" for name in self.varyings), "out vec4 out_color;"]
         return {
             "vertex": Source(f"viewport/{self.name}.vert", declarations=[*params, *vertex]),
-            "fragment": Source(f"viewport/{self.name}.frag", declarations=[*params, *fragment]),
+            "fragment": Source(f"viewport/{self.name}.frag", dict(self.constants), declarations=[*params, *fragment]),
         }
 
 
-SHADE = ViewportProgram("shade", "ShadeParams", ("depth_tx", "normal_tx", "value_tx", "thickness_tx", "table_tx"))
+SHADE = ViewportProgram(
+    "shade",
+    "ShadeParams",
+    ("depth_tx", "normal_tx", "value_tx", "thickness_tx", "table_tx"),
+    constants=tuple(look_constants().items()),
+)
 SHOW = ViewportProgram("show", "ShowParams", ("depth_tx", "shaded_tx"), ("place",), writes_depth=True)
 
 

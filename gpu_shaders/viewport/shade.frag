@@ -45,13 +45,14 @@ void main() {
     seen.ball = value.x;
     seen.depth = depth;
     seen.thickness = thickness_at(gl_FragCoord.xy / size);
+    seen.contrast = 1.0;
     seen.up = view_from_world * vec3(0.0, 0.0, 1.0);
     LookSettings settings;
     settings.ambient = params.surface.x;
     settings.roughness = params.surface.y;
     settings.light = params.light.xyz;
     settings.light_strength = params.light.w;
-    settings.extinction = params.optics.x * (1.0 - clamp(seen.base, 0.0, 1.0));
+    settings.absorption = params.optics.x;
     settings.ior = params.optics.y;
     settings.depth_range = params.ranges.xy;
     settings.speed_range = params.ranges.zw;

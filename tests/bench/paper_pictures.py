@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ BASIN_RADIUS = 1.9
 """Of the basin under the jets, Blender units."""
 SPHERES = meniscus.Field("power_1", 1e-3)
 """A field so steep that balls hardly blend: the union of their influence spheres, to a thousandth of R."""
+HEADLIGHT = meniscus.Look(style="headlight")
 DEPTH_CONTRAST = 3.0
 """Of figure 11's enhanced picture."""
 COLORS = 256
@@ -103,7 +105,14 @@ def _camera(scene: str) -> meniscus.Camera:
 
 def _fluid(scene: str, **instead: Any) -> meniscus.ImageBuffers:
     """The picture of a scene; other arguments of `meniscus.render` may take the place of its own."""
-    settings = {"balls": _balls(scene), "camera": _camera(scene), "field": SCENES[scene].field, "method": METHOD, **instead}
+    settings = {
+        "balls": _balls(scene),
+        "camera": _camera(scene),
+        "field": SCENES[scene].field,
+        "method": METHOD,
+        "look": HEADLIGHT,
+        **instead,
+    }
     return meniscus.render(passes=("combined", "depth"), **settings)
 
 
@@ -156,7 +165,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "figure_10_close": partial(_tank, "kanamori_figure_10_close"),
     "figure_11_spheres": partial(_spheres, "kanamori_figure_11"),
     "figure_11_metaballs": partial(_plain, "kanamori_figure_11"),
-    "figure_11_enhanced": partial(_plain, "kanamori_figure_11", look=meniscus.Look(depth_contrast=DEPTH_CONTRAST)),
+    "figure_11_enhanced": partial(_plain, "kanamori_figure_11", look=replace(HEADLIGHT, depth_contrast=DEPTH_CONTRAST)),
     "figure_12_early": partial(_basin, "kanamori_figure_12_early"),
     "figure_12_full": partial(_basin, "kanamori_figure_12_full"),
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from judge import expected, judge
@@ -11,6 +13,7 @@ import meniscus
 from meniscus.addon.render.depth_contrast import spatial_importance
 from meniscus.addon.render.registry import method_infos
 
+HEADLIGHT = meniscus.Look(style="headlight")
 METHODS = [info.name for info in method_infos()]
 
 
@@ -56,7 +59,7 @@ def test_colors_blend_by_their_share_of_the_density(method):
     # Half way between two equal balls both colours count alike; on the far side of one only its own.
     balls = meniscus.Balls([[-0.3, 0, 0], [0.3, 0, 0]], 0.8, colors=[[1, 0, 0], [0, 0, 1]])
     camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=41, height=41)
-    look = meniscus.Look(ambient=1.0)
+    look = meniscus.Look(style="flat")
     image = meniscus.render(balls, camera, meniscus.Field(), method=method, passes=("combined",), look=look)
     row = image["combined"][20]
     np.testing.assert_allclose(row[20], [0.5, 0, 0.5, 1], atol=1e-5)
@@ -74,7 +77,7 @@ def test_depth_contrast_is_that_of_the_exact_depths(method, projection):
     depth = np.where(hit, (want.t / want.stretch).reshape(hit.shape), 1e10).astype(np.float32)
     plain, changed = (
         meniscus.render(scene.balls, camera, scene.field, method=method, passes=("combined",), look=look)["combined"]
-        for look in (meniscus.Look(), meniscus.Look(depth_contrast=4.0, depth_contrast_radius=0.05))
+        for look in (HEADLIGHT, replace(HEADLIGHT, depth_contrast=4.0, depth_contrast_radius=0.05))
     )
     factor = 1 + np.tanh(4 * spatial_importance(depth, hit, camera, 0.05))
     assert np.ptp(factor[hit]) > 1, "the scene should have steps in depth"

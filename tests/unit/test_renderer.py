@@ -58,7 +58,7 @@ def test_position_lies_on_the_ray_at_the_depth():
 
 def test_headlight_is_brightest_where_the_surface_faces_the_eye():
     camera = meniscus.Camera.orthographic((0, -4, 0), (0, 0, 0), scale=2, width=21, height=21)
-    look = meniscus.Look(color=(0.5, 0.25, 1.0), ambient=0.2)
+    look = meniscus.Look(style="headlight", color=(0.5, 0.25, 1.0), ambient=0.2)
     row = render(camera, meniscus.Balls([[0, 0, 0]], 0.9), look=look)["combined"][10]
     np.testing.assert_allclose(row[10, :3], (0.5, 0.25, 1.0), atol=1e-4)
     lit = row[row[:, 3] > 0][:, 0]
