@@ -21,7 +21,7 @@ TABLE_SIZE = 65
 """Colours along each axis of a table."""
 
 _LOW, _HIGH, _OFFSET = -6.0, 14 / 3, 1 / 63
-"""The axes of a table are ``log2((light + offset) / (1 + offset))``, from 0 to 25, as in lib/display.glsl. 1 is in the table."""
+"""The axes of a table are ``log2((light + offset) / (1 + offset))``, 0 to 25, as in lib/display.glsl. 1 is in it."""
 
 _PLAIN: Key = ("sRGB", "Standard", "None", None, None)
 """What needs no table: display, view transform, look, white balance, and curves with the exposure."""

@@ -237,7 +237,7 @@ class _Shot:
         look = self.look
         if look.depth_contrast == 0:
             return np.ones(hit.shape, np.float32)
-        importance = spatial_importance(surface.depth, hit, self.request.camera, look.depth_contrast_radius)
+        importance = spatial_importance(surface.depth, hit, self.camera, look.depth_contrast_radius)
         # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
         return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
 
