@@ -114,7 +114,7 @@ class Look:
     roughness: float = 0.2
     light: tuple[float, float, float] = (-0.4, 0.6, 0.693)
     light_strength: float = 1.0
-    absorption: float = 1.0
+    absorption: float = 2.0
     ior: float = 1.33
     speed_range: tuple[float, float] | None = None
     depth_contrast: float = 0.0

@@ -16,6 +16,9 @@ FloatArray = npt.NDArray[np.float32]
 DIELECTRIC = 0.04
 """What most materials reflect of light that falls straight on them."""
 
+GREY_BEHIND = 0.25
+"""How light what is seen through water is taken to be."""
+
 
 @dataclass(frozen=True)
 class SurfacePoints:
@@ -173,17 +176,23 @@ def _sky(up: FloatArray) -> FloatArray:
 
 def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
     reflected = _fresnel(np.maximum(_dot(normal, points.to_eye), 1e-3), look.ior)
-    sun = _highlight(normal, points.to_eye, np.array(look.light_direction, np.float32), 0.05 + 0.6 * look.roughness)
+    light = np.array(look.light_direction, np.float32)
+    sun = _highlight(normal, points.to_eye, light, 0.05 + 0.6 * look.roughness)
     mirrored = _reflected(points.to_eye, normal)
     mirrored = _unit(mirrored + look.roughness**2 * (normal - mirrored))
     base = np.clip(points.base, 0, 1)
     passes = np.exp(-look.absorption * points.thickness[:, None] * (1 - base))
-    lit = 0.5 * _sky(0.5 + 0.5 * _dot(normal, points.up))
-    within = (1 - reflected)[:, None] * (1 - passes) * base * lit
-    color = reflected[:, None] * _sky(_dot(mirrored, points.up)) + (12 * reflected * sun)[:, None] + within
+    mean = passes.mean(axis=1)
+    key = np.clip((_dot(normal, light) + 0.5) / 1.5, 0, 1)
+    lit = (0.4 + 1.6 * key * key)[:, None] * _sky(0.5 + 0.5 * _dot(normal, points.up))
+    within = (1 - passes) * base * lit
+    # What is behind is dimmed as a whole where it is drawn over; its tint is that of a grey.
+    tint = (passes - mean[:, None]) * GREY_BEHIND
+    color = reflected[:, None] * _sky(_dot(mirrored, points.up)) + (12 * reflected * sun)[:, None]
+    color += (1 - reflected)[:, None] * np.maximum(within + tint, 0)
     rgba = np.empty((len(color), 4), np.float32)
     rgba[:, :3] = (look.light_strength * points.contrast)[:, None] * color
-    rgba[:, 3] = 1 - (1 - reflected) * passes.mean(axis=1)
+    rgba[:, 3] = 1 - (1 - reflected) * mean
     return rgba
 
 

@@ -3,6 +3,7 @@
 
 const float PI = 3.14159265;
 const float DIELECTRIC = 0.04;
+const float GREY_BEHIND = 0.25;
 
 struct LookInput {
     // Unit, view space: x to the right, y up, z to the eye.
@@ -91,11 +92,15 @@ vec4 water(LookInput seen, LookSettings look, vec3 normal) {
     float sun = highlight(normal, seen.to_eye, look.light, 0.05 + 0.6 * look.roughness);
     vec3 mirrored = normalize(mix(reflect(-seen.to_eye, normal), normal, look.roughness * look.roughness));
     vec3 passes = exp(-look.absorption * seen.thickness * (1.0 - clamp(seen.base, 0.0, 1.0)));
-    vec3 lit = 0.5 * sky(0.5 + 0.5 * dot(normal, seen.up));
-    vec3 within = (1.0 - reflected) * (1.0 - passes) * clamp(seen.base, 0.0, 1.0) * lit;
-    vec3 color = look.light_strength * (reflected * sky(dot(mirrored, seen.up)) + reflected * 12.0 * sun + within);
-    float covered = 1.0 - (1.0 - reflected) * dot(passes, vec3(1.0 / 3.0));
-    return vec4(color * seen.contrast, covered);
+    float mean = dot(passes, vec3(1.0 / 3.0));
+    float key = clamp((dot(normal, look.light) + 0.5) / 1.5, 0.0, 1.0);
+    vec3 lit = (0.4 + 1.6 * key * key) * sky(0.5 + 0.5 * dot(normal, seen.up));
+    vec3 within = (1.0 - passes) * clamp(seen.base, 0.0, 1.0) * lit;
+    // What is behind is dimmed as a whole where it is drawn over; its tint is that of a grey.
+    vec3 tint = (passes - mean) * GREY_BEHIND;
+    vec3 color = look.light_strength * (reflected * sky(dot(mirrored, seen.up)) + reflected * 12.0 * sun
+                                        + (1.0 - reflected) * max(within + tint, 0.0));
+    return vec4(color * seen.contrast, 1.0 - (1.0 - reflected) * mean);
 }
 
 vec3 speed_color(float place) {
