@@ -6,7 +6,16 @@ import atexit
 import importlib
 from types import ModuleType
 
-_SUBMODULES = ("properties", "preferences", "panels", "changes", "command_line", "viewport")
+_SUBMODULES = (
+    "properties",
+    "preferences",
+    "version_update",
+    "operators",
+    "panels",
+    "changes",
+    "command_line",
+    "viewport",
+)
 """What has something to register, in the order of registering."""
 
 

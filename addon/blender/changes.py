@@ -18,17 +18,20 @@ class Changes:
     ----------
     revision
         Grows with each.
+    structure
+        Grows where objects may have come, gone, or become or ceased to be fluid.
     may_have_sources
         False where no object supplied balls when last looked, and none has come since.
     """
 
     def __init__(self) -> None:
-        self.revision = 0
+        self.revision = self.structure = 0
         self.may_have_sources = True
 
     def note(self) -> None:
         """Something has changed, what is not known."""
         self.revision += 1
+        self.structure += 1
         self.may_have_sources = True
 
 
@@ -65,6 +68,7 @@ def _note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
                 CHANGES.may_have_sources |= item.original.meniscus.use_fluid
         elif isinstance(item, _IDS_WITH_BALLS):
             CHANGES.revision += 1
+            CHANGES.structure += isinstance(item, (bpy.types.Scene, bpy.types.Collection))
 
 
 _IDS_WITH_BALLS = (

@@ -19,6 +19,7 @@ from ..fluid.errors import InputError, MeniscusError
 from ..output.frame_path import numbered_pattern
 from ..output.whole_file import whole_file
 from .command_line_arguments import parse_arguments
+from .preferences import backend_of
 from .render_frames import FrameReport, RenderJob, render_frames
 
 _commands: list[Any] = []
@@ -93,7 +94,7 @@ def _job(options: argparse.Namespace) -> RenderJob:
         resolution=options.resolution,
         passes=options.passes,
         method=options.method or scene.meniscus.method,
-        backend=options.backend or scene.meniscus.backend,
+        backend=options.backend or backend_of(scene),
         compression=options.compression,
         use_preview=options.preview,
     )

@@ -1,33 +1,202 @@
-"""The panels in the properties editor."""
+"""The panels: in the sidebar of the 3D viewport, and in the properties editor."""
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import ClassVar
 
 import bpy
+from bl_operators.presets import AddPresetBase
+
+from ..fluid.image import RenderInfo
+from .presets import PRESETS
+from .sources import active_source, has_sources, source_flags
+from .texture_sharing import SHARING
+from .version_update import CURRENT_VERSION
+from .viewport_status import STATUS
+
+_CLOSED: ClassVar = {"DEFAULT_CLOSED"}
+
+# Which of the look's settings a style has a use for, in the order of the panel.
+_LOOK_SETTINGS: dict[str, tuple[str, ...]] = {
+    "studio": ("color", "ambient", "roughness", "metallic", "light", "light_strength"),
+    "water": ("color", "absorption", "ior", "roughness", "light", "light_strength"),
+    "headlight": ("color", "ambient"),
+    "flat": ("color",),
+    "normal": (),
+    "depth": (),
+    "speed": (),
+    "id": (),
+}
+_LIT = ("studio", "water", "headlight")
+
+_STAGES_SHOWN = 8
 
 
-class _FluidPanel:
-    """The settings of an object that supplies balls."""
+class MENISCUS_UL_sources(bpy.types.UIList):
+    """The objects of the scene that are used as fluid"""
 
+    bl_idname = "MENISCUS_UL_sources"
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property) -> None:
+        is_emitter = len(item.particle_systems) > 0
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False, icon="PARTICLES" if is_emitter else "POINTCLOUD_DATA")
+        row.prop(item, "hide_viewport", text="", emboss=False, icon_only=True)
+
+    def filter_items(self, _context, data, _property) -> tuple[list[int], list[int]]:
+        return [self.bitflag_filter_item if flag else 0 for flag in source_flags(data)], []
+
+
+class MENISCUS_MT_presets(bpy.types.Menu):
+    """Looks that come with Meniscus, and your own"""
+
+    bl_label = "Presets"
+    preset_subdir = "meniscus"
+    preset_operator = "script.execute_preset"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for name, preset in PRESETS.items():
+            self.layout.operator("meniscus.apply_preset", text=preset.label).preset = name
+        if bpy.utils.preset_paths(self.preset_subdir):
+            self.layout.separator()
+            bpy.types.Menu.draw_preset(self, context)
+
+
+class MENISCUS_OT_add_preset(AddPresetBase, bpy.types.Operator):
+    """Keep the scene's kernel, isovalue and look under a name of your own, or remove the one that is shown"""
+
+    bl_idname = "meniscus.add_preset"
+    bl_label = "Add Preset"
+    preset_menu = "MENISCUS_MT_presets"
+    preset_subdir = "meniscus"
+    preset_defines: ClassVar = ["settings = bpy.context.scene.meniscus"]
+    preset_values: ClassVar = [
+        f"settings.{name}"
+        for name in (
+            *("kernel", "isovalue", "style", "color", "ambient", "roughness", "metallic", "light", "light_strength"),
+            *("absorption", "ior", "use_speed_range", "speed_min", "speed_max", "depth_contrast", "depth_contrast_radius"),
+        )
+    ]
+
+
+class _SidebarPanel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Meniscus"
+
+
+class MENISCUS_PT_sidebar(_SidebarPanel, bpy.types.Panel):
+    """Switch, problem and sources."""
+
+    bl_label = "Meniscus"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.meniscus, "use_viewport", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        _draw_problem(layout)
+        if scene.meniscus.version > CURRENT_VERSION:
+            _draw_text(layout, "This file was saved by a newer Meniscus: settings that this one lacks are not shown.", "INFO")
+        if not has_sources(scene):
+            layout.label(text="Select an object with particles or points.")
+            button = layout.column()
+            button.scale_y = 1.5
+            button.operator("meniscus.add_sources", icon="MOD_FLUIDSIM")
+            return
+        row = layout.row()
+        row.template_list("MENISCUS_UL_sources", "", scene, "objects", scene.meniscus, "source_index", rows=3)
+        buttons = row.column(align=True)
+        buttons.operator("meniscus.add_sources", text="", icon="ADD")
+        buttons.operator("meniscus.remove_source", text="", icon="REMOVE")
+        buttons.separator()
+        buttons.operator("meniscus.select_source", text="", icon="RESTRICT_SELECT_OFF")
+
+
+class MENISCUS_PT_sidebar_source(_SidebarPanel, bpy.types.Panel):
+    """Settings of the source that is chosen in the list."""
+
+    bl_label = "Source"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_sources(context.scene)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        source = active_source(context.scene)
+        if source is not None:
+            _draw_source(self.layout, source.meniscus)
+
+
+class MENISCUS_PT_sidebar_look(_SidebarPanel, bpy.types.Panel):
+    """Colour and light."""
+
+    bl_label = "Look"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        _draw_presets(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_look(self.layout, context.scene.meniscus)
+
+
+class MENISCUS_PT_sidebar_surface(_SidebarPanel, bpy.types.Panel):
+    """What the surface is, and how it is found."""
+
+    bl_label = "Surface"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_surface(self.layout, context.scene.meniscus)
+
+
+class MENISCUS_PT_sidebar_quality(_SidebarPanel, bpy.types.Panel):
+    """How fine, and how fast."""
+
+    bl_label = "Viewport Quality"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = _split(self.layout)
+        layout.prop(context.scene.meniscus, "preview_samples")
+        layout.prop(context.scene.meniscus, "preview_frame_rate")
+
+
+class MENISCUS_PT_sidebar_statistics(_SidebarPanel, bpy.types.Panel):
+    """How the newest image of a viewport came about."""
+
+    bl_label = "Statistics"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        if STATUS.info is None:
+            self.layout.label(text="Nothing has been drawn yet.")
+        else:
+            _draw_statistics(self.layout, STATUS.info)
+
+
+class _PropertiesPanel:
     bl_label = "Meniscus"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+
+class _FluidPanel(_PropertiesPanel):
+    """The settings of an object that supplies balls."""
 
     def draw_header(self, context: bpy.types.Context) -> None:
         self.layout.prop(context.object.meniscus, "use_fluid", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
-        settings = context.object.meniscus
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = True
-        layout.active = settings.use_fluid
-        layout.prop(settings, "source")
-        _draw_radius(layout.column(), settings)
-        layout.prop(settings, "weight")
-        _draw_color(layout.column(), settings)
+        self.layout.active = context.object.meniscus.use_fluid
+        _draw_source(self.layout, context.object.meniscus)
 
 
 class MENISCUS_PT_object(_FluidPanel, bpy.types.Panel):
@@ -50,29 +219,43 @@ class MENISCUS_PT_particles(_FluidPanel, bpy.types.Panel):
         return context.object is not None and len(context.object.particle_systems) > 0
 
 
-class MENISCUS_PT_scene(bpy.types.Panel):
+class MENISCUS_PT_data(_FluidPanel, bpy.types.Panel):
+    """The same settings beside those of the object's points."""
+
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type in ("MESH", "POINTCLOUD", "CURVES", "CURVE")
+
+
+class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
     """The surface of all fluids in the scene."""
 
-    bl_label = "Meniscus"
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
     bl_context = "render"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        _draw_presets(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
-        settings = context.scene.meniscus
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(settings, "kernel")
-        layout.prop(settings, "isovalue")
-        layout.prop(settings, "method")
-        layout.prop(settings, "backend")
-        layout.prop(settings, "color")
-        layout.prop(settings, "ambient")
-        layout.prop(settings, "depth_contrast")
-        radius = layout.column()
-        radius.active = settings.depth_contrast > 0
-        radius.prop(settings, "depth_contrast_radius")
+        _draw_surface(self.layout, context.scene.meniscus)
+        self.layout.separator()
+        _draw_look(self.layout, context.scene.meniscus)
+
+
+def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Names to the left, values to the right, with dots to animate them."""
+    layout.use_property_split = True
+    layout.use_property_decorate = True
+    return layout
+
+
+def _draw_source(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout = _split(layout)
+    layout.prop(settings, "source")
+    _draw_radius(layout.column(), settings)
+    layout.prop(settings, "weight")
+    _draw_color(layout.column(), settings)
 
 
 def _draw_radius(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -93,7 +276,96 @@ def _draw_color(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
         layout.prop(settings, "color_attribute")
 
 
-_CLASSES = (MENISCUS_PT_object, MENISCUS_PT_particles, MENISCUS_PT_scene)
+def _draw_surface(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout = _split(layout)
+    for name in ("kernel", "isovalue", "method", "backend"):
+        layout.prop(settings, name)
+
+
+def _draw_look(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout = _split(layout)
+    layout.prop(settings, "style")
+    for name in _LOOK_SETTINGS[settings.style]:
+        layout.prop(settings, name)
+    if settings.style == "speed":
+        layout.prop(settings, "use_speed_range")
+        ends = layout.column(align=True)
+        ends.active = settings.use_speed_range
+        ends.prop(settings, "speed_min")
+        ends.prop(settings, "speed_max")
+    if settings.style in _LIT:
+        layout.prop(settings, "depth_contrast")
+        radius = layout.column()
+        radius.active = settings.depth_contrast > 0
+        radius.prop(settings, "depth_contrast_radius")
+
+
+def _draw_presets(layout: bpy.types.UILayout) -> None:
+    row = layout.row(align=True)
+    row.menu("MENISCUS_MT_presets", text="", icon="PRESET")
+    row.operator("meniscus.add_preset", text="", icon="ADD")
+
+
+def _draw_problem(layout: bpy.types.UILayout) -> None:
+    if STATUS.problem:
+        box = layout.box()
+        _draw_text(box, STATUS.problem, "ERROR")
+        box.operator("meniscus.copy_problem", icon="COPYDOWN")
+
+
+def _draw_text(layout: bpy.types.UILayout, text: str, icon: str) -> None:
+    """A sentence over as many lines as the width of the sidebar needs; labels do not wrap."""
+    width = bpy.context.region.width if bpy.context.region else 280
+    letters = max(20, int(width / (7 * bpy.context.preferences.system.ui_scale)) - 6)
+    column = layout.column(align=True)
+    for number, line in enumerate(wrap(text, letters)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
+    lines = [
+        ("Method", info.method.replace("_", " ").title()),
+        ("Device", info.device),
+        ("Balls", f"{info.counts.get('balls', 0):,}"),
+    ]
+    if "balls_drawn" in info.counts:
+        lines.append(("Drawn", f"{info.counts['balls_drawn']:,}"))
+    lines += [
+        (stage.replace("_", " ").title(), f"{time:.1f} ms") for stage, time in list(info.milliseconds.items())[:_STAGES_SHOWN]
+    ]
+    names, values = _columns(layout)
+    for name, value in lines:
+        names.label(text=name)
+        values.label(text=value)
+    _draw_text(layout, f"{info.reason}.", "INFO")
+    if STATUS.left_out:
+        _draw_text(layout, STATUS.left_out, "ERROR")
+    if SHARING.problem and info.backend == "gpu":
+        _draw_text(layout, f"{SHARING.problem}.", "INFO")
+
+
+def _columns(layout: bpy.types.UILayout) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:
+    split = layout.split(factor=0.35)
+    names = split.column(align=True)
+    names.alignment = "RIGHT"
+    return names, split.column(align=True)
+
+
+_CLASSES = (
+    MENISCUS_UL_sources,
+    MENISCUS_MT_presets,
+    MENISCUS_OT_add_preset,
+    MENISCUS_PT_sidebar,
+    MENISCUS_PT_sidebar_source,
+    MENISCUS_PT_sidebar_look,
+    MENISCUS_PT_sidebar_surface,
+    MENISCUS_PT_sidebar_quality,
+    MENISCUS_PT_sidebar_statistics,
+    MENISCUS_PT_object,
+    MENISCUS_PT_particles,
+    MENISCUS_PT_data,
+    MENISCUS_PT_scene,
+)
 
 
 def register() -> None:

@@ -56,6 +56,11 @@ def preferences() -> MENISCUS_AP_preferences | SimpleNamespace:
     return addon.preferences if addon is not None and addon.preferences is not None else _DEFAULTS
 
 
+def backend_of(scene: bpy.types.Scene) -> str:
+    """The back-end that a scene asks for, else the user."""
+    return scene.meniscus.backend if scene.meniscus.backend != "auto" else preferences().backend
+
+
 def register() -> None:
     """Show the settings in the preferences."""
     bpy.utils.register_class(MENISCUS_AP_preferences)

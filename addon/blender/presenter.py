@@ -237,7 +237,7 @@ def _shade_params(sample: _Sample, look: Look, transform: DisplayTransform) -> n
         *camera.world_from_view.T,
         (window.left, window.bottom, window.right, window.top),
         (*look.light_direction, look.light_strength),
-        (look.absorption, look.ior, 0.0, 0.0),
+        (look.absorption, look.ior, look.metallic, 0.0),
         (*look.color, float("color" in sample.textures)),
         (*picture.depth_range, *(look.speed_range or picture.speed_range)),
         (look.ambient, look.roughness, list(LOOK_STYLES).index(look.style), float(camera.is_perspective)),

@@ -167,6 +167,18 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_max=60,
         update=note_setting,
     )
+    version: IntProperty(
+        name="Version",
+        description="Of the settings, see version_update.py; 0 where the file was saved before settings had versions",
+        default=0,
+        options={"HIDDEN"},
+    )
+    source_index: IntProperty(
+        name="Active Source",
+        description="Which of the scene's objects is chosen in the list of sources",
+        default=0,
+        options={"HIDDEN"},
+    )
     kernel: EnumProperty(
         name="Kernel",
         description="How the density of a ball falls from its centre to its influence radius",
@@ -228,6 +240,15 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         name="Roughness",
         description="How dull the surface is: 0 is a mirror",
         default=Look().roughness,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=note_setting,
+    )
+    metallic: FloatProperty(
+        name="Metallic",
+        description="1 is metal, which reflects in its own colour",
+        default=Look().metallic,
         min=0.0,
         max=1.0,
         subtype="FACTOR",

@@ -63,6 +63,7 @@ def read_look(scene: bpy.types.Scene) -> Look:
         color=tuple(settings.color),
         ambient=settings.ambient,
         roughness=settings.roughness,
+        metallic=settings.metallic,
         light=tuple(settings.light),
         light_strength=settings.light_strength,
         absorption=settings.absorption,

@@ -18,6 +18,7 @@ from ..output.frame_path import frame_path
 from ..output.whole_file import prepare_place
 from ..render.method import timed
 from ..render.renderer import render
+from .preferences import preferences
 from .preview import write_png
 from .read_camera import read_camera
 from .read_scene import read_balls, read_field, read_look
@@ -186,8 +187,8 @@ def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bo
 
 
 def _threads(scene: bpy.types.Scene) -> int:
-    """How many threads the scene's performance settings allow, 0 for one a core."""
-    return int(scene.render.threads) if scene.render.threads_mode == "FIXED" else 0
+    """How many threads the scene's performance settings allow, else the user, 0 for one a core."""
+    return int(scene.render.threads) if scene.render.threads_mode == "FIXED" else preferences().threads
 
 
 def _write_preview(image: ImageBuffers, report: FrameReport) -> None:

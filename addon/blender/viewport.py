@@ -22,7 +22,7 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..render.live_view import LiveRenderer, LiveView, View
 from ..render.method import timed
 from .changes import CHANGES
-from .preferences import preferences
+from .preferences import backend_of, preferences
 from .presenter import Place, Presenter
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
@@ -212,7 +212,7 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
         passes=("depth", "normal", *wanted),
         uses_thickness=LOOK_STYLES[look.style].uses_thickness,
         method=settings.method,
-        backend=chosen.backend if settings.backend == "auto" else settings.backend,
+        backend=backend_of(scene),
         threads=chosen.threads,
         samples=settings.preview_samples,
         frame_rate=settings.preview_frame_rate,

@@ -83,6 +83,8 @@ class Look:
         Share of the light that does not depend on the angle, 0 to 1 (studio, headlight).
     roughness
         0 is a mirror, 1 is dull (studio, water).
+    metallic
+        1 is metal, which reflects in its own colour and has no other (studio).
     light
         (3,) vector towards the key light, in view space: x to the right, y up, z to the eye (studio, water).
     light_strength
@@ -112,6 +114,7 @@ class Look:
     color: tuple[float, float, float] = (0.06, 0.27, 0.6)
     ambient: float = 0.1
     roughness: float = 0.2
+    metallic: float = 0.0
     light: tuple[float, float, float] = (-0.4, 0.6, 0.693)
     light_strength: float = 1.0
     absorption: float = 2.0
@@ -149,6 +152,7 @@ class Look:
 _LIMITS = (
     ("ambient", 0.0, 1.0),
     ("roughness", 0.0, 1.0),
+    ("metallic", 0.0, 1.0),
     ("light_strength", 0.0, 1e6),
     ("absorption", 0.0, 1e6),
     ("ior", 1.0, 10.0),

@@ -72,7 +72,7 @@ def render(
         Each with one sentence for the user.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
-    return shot.image(shot.runner.find_surface(shot.request))
+    return shot.image(shot.choice.runner.find_surface(shot.request))
 
 
 def render_progressively(
@@ -97,10 +97,11 @@ def render_progressively(
     cannot do so yields that one only.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
-    if isinstance(shot.runner, ProgressiveMethod):
-        yield from map(shot.image, shot.runner.find_surfaces(shot.request))
+    runner = shot.choice.runner
+    if isinstance(runner, ProgressiveMethod):
+        yield from map(shot.image, runner.find_surfaces(shot.request))
     else:
-        yield shot.image(shot.runner.find_surface(shot.request))
+        yield shot.image(shot.choice.runner.find_surface(shot.request))
 
 
 def render_to_show(
@@ -123,7 +124,7 @@ def render_to_show(
     ImageBuffers.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, None, is_cancelled, None, threads)
-    runner = shot.runner
+    runner = shot.choice.runner
     if isinstance(runner, DeviceMethod) and runner.shares_textures and camera.region is None and shot.can_stay_on_device:
         return shot.device_image(runner.find_surface_on_device(shot.request))
     return shot.image(runner.find_surface(shot.request))
@@ -133,8 +134,7 @@ def render_to_show(
 class _Shot:
     """One view to be rendered by a method."""
 
-    info: MethodInfo
-    runner: Method
+    choice: _Choice
     request: Request
     camera: Camera
     passes: tuple[str, ...]
@@ -160,10 +160,10 @@ class _Shot:
         look = look or Look()
         needed = {*names, *(LOOK_STYLES[look.style].passes if "combined" in names else ())}
         attributes = frozenset(_NEEDED[name] for name in needed if name in _NEEDED)
-        info, runner = _pick_method(method, backend, attributes)
+        choice = _pick_method(method, backend, attributes)
         watch = _watch(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)
-        return cls(info, runner, request, camera, names, look)
+        return cls(choice, request, camera, names, look)
 
     @property
     def can_stay_on_device(self) -> bool:
@@ -177,7 +177,8 @@ class _Shot:
 
     def _report(self, surface: Surface | DeviceSurface) -> RenderInfo:
         balls = self.request.balls
-        report = RenderInfo(self.info.name, self.info.backend, self.runner.device, dropped=dict(balls.dropped))
+        info = self.choice.info
+        report = RenderInfo(info.name, info.backend, self.choice.runner.device, self.choice.reason, dropped=dict(balls.dropped))
         report.milliseconds = dict(surface.milliseconds)
         report.counts = {"balls": len(balls), **surface.counts}
         return report
@@ -242,7 +243,16 @@ class _Shot:
         return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
 
 
-def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> tuple[MethodInfo, Method]:
+@dataclass(frozen=True)
+class _Choice:
+    """A method that runs, and why it was taken."""
+
+    info: MethodInfo
+    runner: Method
+    reason: str
+
+
+def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
     """The method asked for, or the preferred one that runs here on the back-end asked for and finds these attributes.
 
     Left to choose, OpenGL is taken where it is hardware: in software it is slower than the CPU back-end.
@@ -250,24 +260,29 @@ def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) ->
     if backend not in BACKENDS:
         raise InputError(f"Unknown back-end '{backend}': choose one of {', '.join(BACKENDS)}")
     if method != "auto":
-        info, runner = create_method(method)
-        if backend not in ("auto", info.backend):
-            raise InputError(f"The method '{method}' runs on the back-end '{info.backend}', not on '{backend}'")
-        if missing := _passes_without(attributes - info.attributes):
-            raise InputError(f"The method '{method}' cannot make the pass {missing}; choose another method")
-        return info, runner
+        return _named_method(method, backend, attributes)
     problems: list[MeniscusError] = []
     for info in method_infos():
         if backend in ("auto", info.backend):
             try:
                 if backend == "auto" and runs_in_software_opengl(info):
-                    continue
+                    raise DeviceError(f"{info.label} would run in software, where the processor itself is faster")
                 if missing := _passes_without(attributes - info.attributes):
                     raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
-                return create_method(info.name)
+                reason = str(problems[0]) if problems else "The first choice, and it runs here"
+                return _Choice(*create_method(info.name), reason)
             except (DeviceError, InputError) as error:
                 problems.append(error)
     raise problems[0]
+
+
+def _named_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
+    info, runner = create_method(method)
+    if backend not in ("auto", info.backend):
+        raise InputError(f"The method '{method}' runs on the back-end '{info.backend}', not on '{backend}'")
+    if missing := _passes_without(attributes - info.attributes):
+        raise InputError(f"The method '{method}' cannot make the pass {missing}; choose another method")
+    return _Choice(info, runner, "Chosen in the settings")
 
 
 def _passes_without(missing: frozenset[Attribute]) -> str:

@@ -130,8 +130,8 @@ def _highlight(normal: FloatArray, to_eye: FloatArray, light: FloatArray, roughn
     return np.asarray(np.minimum(facets * np.maximum(_dot(normal, light), 0), 16))
 
 
-def _schlick(cosine: FloatArray, straight: float) -> FloatArray:
-    return np.asarray(straight + (1 - straight) * (1 - np.clip(cosine, 0, 1)) ** 5)
+def _schlick(cosine: FloatArray, straight: FloatArray) -> FloatArray:
+    return np.asarray(straight + (1 - straight) * (1 - np.clip(cosine, 0, 1))[:, None] ** 5)
 
 
 def _fresnel(cosine: FloatArray, ior: float) -> FloatArray:
@@ -159,11 +159,12 @@ def _studio(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArr
     diffuse = (0.95 * key * key)[:, None] * np.array([1.0, 0.97, 0.92], np.float32)
     diffuse = (1 - look.ambient) * (diffuse + (0.18 * fill)[:, None] * np.array([0.7, 0.85, 1.0], np.float32))
     mirrored = _reflected(points.to_eye, normal)
-    share = _schlick(_dot(normal, points.to_eye), DIELECTRIC) * (1 - 0.7 * look.roughness)
-    gloss = share[:, None] * _studio_room(mirrored, light, look.roughness)
-    shine = _schlick(_dot(light, _unit(light + points.to_eye)), DIELECTRIC)
-    gloss += (shine * _highlight(normal, points.to_eye, light, look.roughness))[:, None]
-    color = points.base * ((0.3 + look.ambient) * soft + diffuse) + gloss
+    straight = DIELECTRIC + look.metallic * (points.base - DIELECTRIC)
+    share = _schlick(_dot(normal, points.to_eye), straight) * (1 - 0.7 * look.roughness)
+    gloss = share * _studio_room(mirrored, light, look.roughness)
+    shine = _schlick(_dot(light, _unit(light + points.to_eye)), straight)
+    gloss += shine * _highlight(normal, points.to_eye, light, look.roughness)[:, None]
+    color = (1 - look.metallic) * points.base * ((0.3 + look.ambient) * soft + diffuse) + gloss
     return _opaque((look.light_strength * points.contrast)[:, None] * color)
 
 

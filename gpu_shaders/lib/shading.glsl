@@ -25,6 +25,7 @@ struct LookInput {
 struct LookSettings {
     float ambient;
     float roughness;
+    float metallic;
     // Unit, view space, towards the key light.
     vec3 light;
     float light_strength;
@@ -45,7 +46,7 @@ float highlight(vec3 normal, vec3 to_eye, vec3 light, float roughness) {
     return min(facets * max(dot(normal, light), 0.0), 16.0);
 }
 
-float schlick(float cosine, float straight) {
+vec3 schlick(float cosine, vec3 straight) {
     float grazing = 1.0 - clamp(cosine, 0.0, 1.0);
     return straight + (1.0 - straight) * grazing * grazing * grazing * grazing * grazing;
 }
@@ -74,10 +75,11 @@ vec3 studio(LookInput seen, LookSettings look, vec3 normal) {
     vec3 soft = mix(vec3(0.45, 0.42, 0.40), vec3(0.85, 0.92, 1.0), 0.5 + 0.5 * normal.y);
     vec3 diffuse = (1.0 - look.ambient) * (0.95 * key * key * vec3(1.0, 0.97, 0.92) + 0.18 * fill * vec3(0.7, 0.85, 1.0));
     vec3 mirrored = reflect(-seen.to_eye, normal);
-    vec3 gloss = schlick(cosine, DIELECTRIC) * (1.0 - 0.7 * look.roughness) * studio_room(mirrored, look.light, look.roughness);
-    gloss += schlick(dot(look.light, normalize(look.light + seen.to_eye)), DIELECTRIC)
+    vec3 straight = mix(vec3(DIELECTRIC), seen.base, look.metallic);
+    vec3 gloss = schlick(cosine, straight) * (1.0 - 0.7 * look.roughness) * studio_room(mirrored, look.light, look.roughness);
+    gloss += schlick(dot(look.light, normalize(look.light + seen.to_eye)), straight)
              * highlight(normal, seen.to_eye, look.light, look.roughness);
-    return look.light_strength * seen.contrast * (seen.base * ((0.3 + look.ambient) * soft + diffuse) + gloss);
+    return look.light_strength * seen.contrast * ((1.0 - look.metallic) * seen.base * ((0.3 + look.ambient) * soft + diffuse) + gloss);
 }
 
 // Over open ground; `up` is the cosine to the zenith.

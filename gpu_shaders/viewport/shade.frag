@@ -50,6 +50,7 @@ void main() {
     LookSettings settings;
     settings.ambient = params.surface.x;
     settings.roughness = params.surface.y;
+    settings.metallic = params.optics.z;
     settings.light = params.light.xyz;
     settings.light_strength = params.light.w;
     settings.absorption = params.optics.x;

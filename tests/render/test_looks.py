@@ -19,7 +19,7 @@ MAIN = """
 uniform vec3 light;
 uniform vec4 numbers;
 uniform vec4 ranges;
-uniform float ior;
+uniform vec2 optics;
 uniform int style;
 out vec4 color;
 void main() {
@@ -31,7 +31,8 @@ void main() {
     look.light = light;
     look.light_strength = numbers.z;
     look.absorption = numbers.w;
-    look.ior = ior;
+    look.ior = optics.x;
+    look.metallic = optics.y;
     look.depth_range = ranges.xy;
     look.speed_range = ranges.zw;
     color = look_color(style, seen, look);
@@ -75,7 +76,7 @@ def colors_by_shader(gl, points, look):
         "light": look.light_direction,
         "numbers": (look.ambient, look.roughness, look.light_strength, look.absorption),
         "ranges": (*RANGES.depth, *(look.speed_range or RANGES.speed)),
-        "ior": look.ior,
+        "optics": (look.ior, look.metallic),
         "style": list(LOOK_STYLES).index(look.style),
     }
     for name, value in values.items():
@@ -93,7 +94,9 @@ def colors_by_shader(gl, points, look):
 @pytest.mark.parametrize("style", LOOK_STYLES)
 @pytest.mark.parametrize("roughness", [0.0, 0.3, 1.0])
 def test_shader_and_numpy_agree(opengl, points, style, roughness):
-    look = meniscus.Look(style=style, roughness=roughness, ambient=0.3, light=(1, 2, 3), light_strength=1.4, absorption=0.8)
+    look = meniscus.Look(
+        style=style, roughness=roughness, metallic=0.4, ambient=0.3, light=(1, 2, 3), light_strength=1.4, absorption=0.8
+    )
     expected = shaded(points, look, RANGES)
     actual = opengl.run(lambda: colors_by_shader(opengl.gl, points, look))
     assert expected[:, :3].std() > 0.02
