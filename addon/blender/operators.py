@@ -25,14 +25,15 @@ class MENISCUS_OT_add_sources(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.selected_objects:
+        if not _selected(context):
             cls.poll_message_set("Select an object that has particles or points")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> Result:
-        problems = {item.name: problem_of(item) for item in context.selected_objects}
-        added = [item for item in context.selected_objects if not problems[item.name]]
+        selected = _selected(context)
+        problems = {item.name: problem_of(item) for item in selected}
+        added = [item for item in selected if not problems[item.name]]
         for item in added:
             use_as_fluid(item)
         for name, problem in problems.items():
@@ -88,7 +89,7 @@ class MENISCUS_OT_select_source(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> Result:
         source = active_source(context.scene)
-        for item in context.selected_objects:
+        for item in _selected(context):
             item.select_set(False)
         source.select_set(True)
         context.view_layer.objects.active = source
@@ -141,6 +142,10 @@ class MENISCUS_OT_copy_problem(bpy.types.Operator):
         context.window_manager.clipboard = problem_text()
         self.report({"INFO"}, "Copied to the clipboard")
         return {"FINISHED"}
+
+
+def _selected(context: bpy.types.Context) -> list[bpy.types.Object]:
+    return list(context.view_layer.objects.selected)
 
 
 def problem_text() -> str:

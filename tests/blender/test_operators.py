@@ -23,6 +23,7 @@ def cube(scene, name="Cube"):
 
 
 def select(*items):
+    bpy.context.view_layer.update()
     for item in bpy.context.view_layer.objects:
         item.select_set(item in items)
 
@@ -79,7 +80,7 @@ def test_the_chosen_source_is_the_one_that_is_removed_and_selected(meniscus, sce
     assert sources.active_source(scene) == first
     scene.meniscus.source_index = scene.objects.find("C")
     assert bpy.ops.meniscus.select_source() == {"FINISHED"}
-    assert (bpy.context.object, bpy.context.selected_objects) == (second, [second])
+    assert list(bpy.context.view_layer.objects.selected) == [bpy.context.view_layer.objects.active] == [second]
     bpy.ops.meniscus.remove_source()
     assert (first.meniscus.use_fluid, second.meniscus.use_fluid) == (True, False)
     scene.meniscus.source_index = scene.objects.find(plain.name)
