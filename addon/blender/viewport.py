@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import bpy
 import gpu
+import numpy as np
 from bpy.app.handlers import persistent
 
 from ..fluid.balls import Balls
@@ -22,13 +23,14 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..render.live_view import LiveRenderer, LiveView, View
 from ..render.method import timed
 from .changes import CHANGES
+from .legend import draw_legend
 from .preferences import backend_of, preferences
 from .presenter import Place, Presenter
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
 from .texture_sharing import SHARING
 from .view_camera import ViewCamera, view_camera
-from .view_transform import DisplayTransform, ViewTransforms
+from .view_transform import ViewTransforms
 from .viewport_status import STATUS
 
 LONGEST_WAIT = 0.045
@@ -49,6 +51,8 @@ class _Viewport:
         The revision of the live view that was drawn last.
     seen, seen_by
         What it looked through last, and by which numbers.
+    look
+        The look that was drawn last.
     """
 
     live: LiveView
@@ -56,6 +60,7 @@ class _Viewport:
     drawn: int = -1
     seen: ViewCamera | None = None
     seen_by: tuple[object, ...] = ()
+    look: Look | None = None
 
     def look_at(self, balls: Balls) -> ViewCamera | None:
         """The view that Blender is drawing; None where no ball is in it."""
@@ -66,13 +71,11 @@ class _Viewport:
             self.seen, self.seen_by = view_camera(*matrices, *size, balls.bounds), seen_by
         return self.seen
 
-
-@dataclass(frozen=True)
-class _Pause:
-    """Nothing is drawn until something changes, because drawing failed."""
-
-    revision: int
-    look: Look
+    def drawable(self, look: Look, view: View) -> Look:
+        """A look that images of a view can be drawn in: the last one, where they lack what the new one needs."""
+        if self.look is None or look.style == self.look.style or set(_passes(look, view.balls)) <= set(view.passes):
+            self.look = look
+        return self.look
 
 
 class ViewportDrawing:
@@ -84,14 +87,17 @@ class ViewportDrawing:
         self._viewports: dict[int, _Viewport] = {}
         self._dropped: list[_Viewport] = []
         self._transforms = ViewTransforms()
-        self._pause: _Pause | None = None
+        self._legends: dict[int, tuple[float, float]] = {}
+        self._paused_at: int | None = None
         # Blender knows a timer by its address, and a bound method has a new one each time.
         self._timer = self._tick
-        self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
+        add = bpy.types.SpaceView3D.draw_handler_add
+        self._handlers = [add(self._draw, (), "WINDOW", "POST_VIEW"), add(self._draw_legend, (), "WINDOW", "POST_PIXEL")]
 
     def close(self) -> None:
         """Draw no more, and release everything."""
-        bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        for handler in self._handlers:
+            bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
         if bpy.app.timers.is_registered(self._timer):
             bpy.app.timers.unregister(self._timer)
         self._renderer.close()
@@ -104,35 +110,47 @@ class ViewportDrawing:
         for key in list(self._viewports):
             self._drop(key)
         self._scene_balls.forget()
-        self._pause = None
+        self._paused_at = None
         STATUS.clear()
 
     def _draw(self) -> None:
-        """Blender's draw handler. Nothing may leave it: Blender would print it at every redraw."""
+        """Blender's draw handler for what is in the scene."""
         started = time.monotonic()
         context = bpy.context
         self._release_dropped()
-        if not CHANGES.may_have_sources or not context.scene.meniscus.use_viewport:
+        self._legends.pop(context.region.as_pointer(), None)
+        if CHANGES.may_have_sources and context.scene.meniscus.use_viewport:
+            self._guarded(lambda: self._draw_fluid(context, started))
+
+    def _draw_legend(self) -> None:
+        """Blender's draw handler for what lies over the picture."""
+        ends = self._legends.get(bpy.context.region.as_pointer())
+        if ends is not None:
+            self._guarded(lambda: draw_legend(bpy.context.region, bpy.context.scene, ends))
+
+    def _guarded(self, draw: Callable[[], None]) -> None:
+        """Draw, unless that failed and nothing has changed since.
+
+        Nothing may leave a handler: Blender would print it at every redraw.
+        """
+        if self._paused_at == CHANGES.revision:
             return
-        look = read_look(context.scene)
-        if self._pause is not None:
-            if self._pause == _Pause(CHANGES.revision, look):
-                return
-            self._pause = None
+        self._paused_at = None
         try:
-            self._draw_fluid(context, look, started)
+            draw()
         except MeniscusError as error:
-            self._stop(look, str(error), "")
+            self._stop(str(error), "")
         except Exception as error:  # noqa: BLE001 - whatever it is, the user sees it once and Blender goes on
-            self._stop(look, f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
+            self._stop(f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
         if not bpy.app.timers.is_registered(self._timer):
             bpy.app.timers.register(self._timer, first_interval=_TICK)
 
-    def _stop(self, look: Look, problem: str, details: str) -> None:
-        self._pause = _Pause(CHANGES.revision, look)
+    def _stop(self, problem: str, details: str) -> None:
+        self._paused_at = CHANGES.revision
         STATUS.report(problem, details)
 
-    def _draw_fluid(self, context: bpy.types.Context, look: Look, started: float) -> None:
+    def _draw_fluid(self, context: bpy.types.Context, started: float) -> None:
+        look = read_look(context.scene)
         balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
         if balls is None:
             return
@@ -145,7 +163,7 @@ class ViewportDrawing:
             SHARING.begin()
         viewport.live.show(view)
         viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
-        self._present(viewport, look, seen, self._transforms.of(context.scene, context.space_data.shading))
+        self._present(viewport, look, seen, context)
         self._report(viewport, balls)
 
     def _viewport(self, key: int) -> _Viewport:
@@ -153,18 +171,22 @@ class ViewportDrawing:
             self._viewports[key] = _Viewport(self._renderer.open())
         return self._viewports[key]
 
-    def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera, transform: DisplayTransform) -> None:
+    def _present(self, viewport: _Viewport, look: Look, seen: ViewCamera, context: bpy.types.Context) -> None:
         is_new = viewport.drawn != viewport.live.revision
         viewport.drawn = viewport.live.revision
         pictures = viewport.live.pictures
-        if pictures:
-            milliseconds: dict[str, float] = {}
-            shown = pictures[0].view.camera
-            place = Place(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window))
-            with timed(milliseconds, "present"):
-                viewport.presenter.draw(pictures, look, transform, place)
-            if is_new:
-                viewport.live.note_presenting(pictures[-1], milliseconds["present"] / 1e3)
+        if not pictures:
+            return
+        look = viewport.drawable(look, pictures[0].view)
+        if look.style == "speed":
+            self._legends[context.region.as_pointer()] = look.speed_range or pictures[0].speed_range
+        shown, space = pictures[0].view.camera, context.space_data
+        place = Place(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window), _has_depth(space))
+        milliseconds: dict[str, float] = {}
+        with timed(milliseconds, "present"):
+            viewport.presenter.draw(pictures, look, self._transforms.of(context.scene, space.shading), place)
+        if is_new:
+            viewport.live.note_presenting(pictures[-1], milliseconds["present"] / 1e3)
 
     def _report(self, viewport: _Viewport, balls: Balls) -> None:
         pictures = viewport.live.pictures
@@ -182,7 +204,7 @@ class ViewportDrawing:
         is_busy = STATUS.has_news or has_transforms
         for key, viewport in self._viewports.items():
             region, area = regions[key]
-            has_pictures = self._pause is None and viewport.drawn != viewport.live.revision
+            has_pictures = self._paused_at is None and viewport.drawn != viewport.live.revision
             if has_pictures or has_transforms:
                 region.tag_redraw()
             is_busy |= has_pictures or not viewport.live.is_at_rest
@@ -204,12 +226,11 @@ class ViewportDrawing:
 
 def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
     settings, chosen = scene.meniscus, preferences()
-    wanted = [name for name in LOOK_STYLES[look.style].passes if name != "color" or balls.colors is not None]
     return View(
         balls,
         seen.camera.cropped(),
         read_field(scene),
-        passes=("depth", "normal", *wanted),
+        passes=_passes(look, balls),
         uses_thickness=LOOK_STYLES[look.style].uses_thickness,
         method=settings.method,
         backend=backend_of(scene),
@@ -218,6 +239,21 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
         frame_rate=settings.preview_frame_rate,
         memory_limit=chosen.memory_limit << 20,
     )
+
+
+def _passes(look: Look, balls: Balls) -> tuple[str, ...]:
+    """What a look needs of the surface; colours only where the balls have some."""
+    wanted = (name for name in LOOK_STYLES[look.style].passes if name != "color" or balls.colors is not None)
+    return ("depth", "normal", *wanted)
+
+
+def _has_depth(space: bpy.types.SpaceView3D) -> bool:
+    """Whether Blender has the depth of its meshes: up to 4.3 EEVEE leaves it out where overlays are off."""
+    if space.overlay.show_overlays or space.shading.type not in ("MATERIAL", "RENDERED"):
+        return True
+    framebuffer = gpu.state.active_framebuffer_get()
+    x, y, width, height = framebuffer.viewport_get()
+    return bool(np.any(np.asarray(framebuffer.read_depth(x, y + height // 2, width, 1).to_list())))
 
 
 def _view_regions() -> Iterator[tuple[bpy.types.Region, bpy.types.Area]]:
