@@ -18,6 +18,8 @@ class Changes:
     ----------
     revision
         Grows with each.
+    display
+        Grows with each change of how the fluid is drawn.
     structure
         Grows where objects may have come, gone, or become or ceased to be fluid.
     may_have_sources
@@ -25,8 +27,13 @@ class Changes:
     """
 
     def __init__(self) -> None:
-        self.revision = self.structure = 0
+        self.revision = self.display = self.structure = 0
         self.may_have_sources = True
+
+    @property
+    def now(self) -> tuple[int, int]:
+        """Changes with anything that is noted here."""
+        return self.revision, self.display
 
     def note(self) -> None:
         """Something has changed, what is not known."""
@@ -39,9 +46,19 @@ CHANGES = Changes()
 """Of all scenes."""
 
 
-def note_setting(_owner: Any, _context: bpy.types.Context) -> None:
-    """To be called by Blender when a property of ours is set by hand or by a script."""
+def note_source(_owner: Any, _context: bpy.types.Context) -> None:
+    """To be called by Blender when a setting of an object is set by hand or by a script."""
     CHANGES.note()
+    _redraw_viewports()
+
+
+def note_display(_owner: Any, _context: bpy.types.Context) -> None:
+    """To be called by Blender when a setting of a scene is set by hand or by a script: the balls stay what they are."""
+    CHANGES.display += 1
+    _redraw_viewports()
+
+
+def _redraw_viewports() -> None:
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -66,9 +83,14 @@ def _note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
             if item.type not in _OBJECTS_WITHOUT_BALLS:
                 CHANGES.revision += 1
                 CHANGES.may_have_sources |= item.original.meniscus.use_fluid
-        elif isinstance(item, _IDS_WITH_BALLS):
+        elif isinstance(item, _IDS_WITH_BALLS) and not _is_setting(update):
             CHANGES.revision += 1
             CHANGES.structure += isinstance(item, (bpy.types.Scene, bpy.types.Collection))
+
+
+def _is_setting(update: bpy.types.DepsgraphUpdate) -> bool:
+    """Whether a setting of a scene has changed, such as ours. Other changes of scenes do not tag transforms and geometry."""
+    return isinstance(update.id, bpy.types.Scene) and update.is_updated_transform and update.is_updated_geometry
 
 
 _IDS_WITH_BALLS = (

@@ -20,7 +20,7 @@ from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
 from ..render.registry import method_infos
-from .changes import note_setting
+from .changes import note_display, note_source
 
 Item = tuple[str, str, str]
 NumberedItem = tuple[str, str, str, int]
@@ -54,7 +54,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         name="Use as Fluid",
         description="Draw the particles or points of this object as a blended surface",
         default=False,
-        update=note_setting,
+        update=note_source,
     )
     source: EnumProperty(
         name="Source",
@@ -65,7 +65,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("POINTS", "Points", "Mesh vertices and point clouds, also those that Geometry Nodes make", 2),
         ),
         default="AUTO",
-        update=note_setting,
+        update=note_source,
     )
     radius_mode: EnumProperty(
         name="Radius",
@@ -76,7 +76,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("FIXED", "Fixed", "The same radius for all", 2),
         ),
         default="PARTICLE",
-        update=note_setting,
+        update=note_source,
     )
     radius_factor: FloatProperty(
         name="Factor",
@@ -85,13 +85,13 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_min=0.5,
         soft_max=8.0,
-        update=note_setting,
+        update=note_source,
     )
     radius_attribute: StringProperty(
         name="Attribute",
         description="Name of the attribute on points that holds the influence radius, in the object's space",
         default="radius",
-        update=note_setting,
+        update=note_source,
     )
     radius: FloatProperty(
         name="Radius",
@@ -101,7 +101,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         soft_min=0.001,
         subtype="DISTANCE",
         unit="LENGTH",
-        update=note_setting,
+        update=note_source,
     )
     weight: FloatProperty(
         name="Weight",
@@ -109,7 +109,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         default=1.0,
         soft_min=-2.0,
         soft_max=2.0,
-        update=note_setting,
+        update=note_source,
     )
     color_mode: EnumProperty(
         name="Color",
@@ -120,7 +120,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("ATTRIBUTE", "Attribute", "A colour on each point", 2),
         ),
         default="LOOK",
-        update=note_setting,
+        update=note_source,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -130,13 +130,13 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
-        update=note_setting,
+        update=note_source,
     )
     color_attribute: StringProperty(
         name="Attribute",
         description="Name of the colour attribute on points",
         default="Color",
-        update=note_setting,
+        update=note_source,
     )
 
 
@@ -147,7 +147,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         name="Show in Viewports",
         description="Draw the fluid in the 3D viewports",
         default=True,
-        update=note_setting,
+        update=note_display,
     )
     preview_samples: IntProperty(
         name="Samples",
@@ -155,7 +155,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=8,
         min=1,
         max=64,
-        update=note_setting,
+        update=note_display,
     )
     preview_frame_rate: IntProperty(
         name="Frame Rate",
@@ -165,7 +165,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         max=240,
         soft_min=10,
         soft_max=60,
-        update=note_setting,
+        update=note_display,
     )
     version: IntProperty(
         name="Version",
@@ -184,7 +184,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         description="How the density of a ball falls from its centre to its influence radius",
         items=stable_items((kernel.name, kernel.label, kernel.description) for kernel in KERNELS.values()),
         default=Field().kernel,
-        update=note_setting,
+        update=note_display,
     )
     isovalue: FloatProperty(
         name="Isovalue",
@@ -194,28 +194,28 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_min=0.01,
         soft_max=1.0,
         precision=3,
-        update=note_setting,
+        update=note_display,
     )
     method: EnumProperty(
         name="Method",
         description="How the surface is found",
         items=stable_items(method_items()),
         default="auto",
-        update=note_setting,
+        update=note_display,
     )
     backend: EnumProperty(
         name="Device",
         description="What computes the image",
         items=stable_items(BACKENDS),
         default="auto",
-        update=note_setting,
+        update=note_display,
     )
     style: EnumProperty(
         name="Look",
         description="How the surface is coloured",
         items=stable_items((style.name, style.label, style.description) for style in LOOK_STYLES.values()),
         default=Look().style,
-        update=note_setting,
+        update=note_display,
     )
     color: FloatVectorProperty(
         name="Color",
@@ -225,7 +225,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1.0,
         subtype="COLOR",
-        update=note_setting,
+        update=note_display,
     )
     ambient: FloatProperty(
         name="Ambient",
@@ -234,7 +234,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
-        update=note_setting,
+        update=note_display,
     )
     roughness: FloatProperty(
         name="Roughness",
@@ -243,7 +243,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
-        update=note_setting,
+        update=note_display,
     )
     metallic: FloatProperty(
         name="Metallic",
@@ -252,7 +252,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
-        update=note_setting,
+        update=note_display,
     )
     light: FloatVectorProperty(
         name="Light",
@@ -260,7 +260,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=Look().light,
         size=3,
         subtype="DIRECTION",
-        update=note_setting,
+        update=note_display,
     )
     light_strength: FloatProperty(
         name="Strength",
@@ -268,7 +268,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=Look().light_strength,
         min=0.0,
         soft_max=4.0,
-        update=note_setting,
+        update=note_display,
     )
     absorption: FloatProperty(
         name="Absorption",
@@ -276,7 +276,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=Look().absorption,
         min=0.0,
         soft_max=20.0,
-        update=note_setting,
+        update=note_display,
     )
     ior: FloatProperty(
         name="IOR",
@@ -285,13 +285,13 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=1.0,
         max=3.0,
         precision=3,
-        update=note_setting,
+        update=note_display,
     )
     use_speed_range: BoolProperty(
         name="Fixed Range",
         description="Give the speeds at the ends of the colour map instead of 0 and the speed of the fastest ball",
         default=False,
-        update=note_setting,
+        update=note_display,
     )
     speed_min: FloatProperty(
         name="Slow",
@@ -299,7 +299,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=0.0,
         min=0.0,
         unit="VELOCITY",
-        update=note_setting,
+        update=note_display,
     )
     speed_max: FloatProperty(
         name="Fast",
@@ -307,7 +307,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=5.0,
         min=0.0,
         unit="VELOCITY",
-        update=note_setting,
+        update=note_display,
     )
     depth_contrast: FloatProperty(
         name="Depth Contrast",
@@ -316,7 +316,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         max=100.0,
         soft_max=10.0,
-        update=note_setting,
+        update=note_display,
     )
     depth_contrast_radius: FloatProperty(
         name="Contrast Radius",
@@ -327,7 +327,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         soft_max=0.2,
         precision=3,
         subtype="FACTOR",
-        update=note_setting,
+        update=note_display,
     )
 
 

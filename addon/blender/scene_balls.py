@@ -20,7 +20,9 @@ Key = tuple[int, str, int]
 
 @dataclass
 class _Entry:
-    revision: int
+    """What was read, when, and with which colour of the scene, which is that of balls without one of their own."""
+
+    read_at: tuple[int, tuple[float, ...]]
     balls: Balls | None
 
 
@@ -55,11 +57,12 @@ class SceneBalls:
             return None
         key = _key(depsgraph, space)
         entry = self._entries.get(key)
-        if entry is None or entry.revision != self._changes.revision:
+        now = self._changes.revision, tuple(depsgraph.scene.meniscus.color)
+        if entry is None or entry.read_at != now:
             balls = self._read(depsgraph, space)
             if entry is not None and _is_same(balls, entry.balls):
                 balls = entry.balls
-            self._entries[key] = entry = _Entry(self._changes.revision, balls)
+            self._entries[key] = entry = _Entry(now, balls)
         return entry.balls
 
     def _read(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Balls | None:

@@ -88,7 +88,7 @@ class ViewportDrawing:
         self._dropped: list[_Viewport] = []
         self._transforms = ViewTransforms()
         self._legends: dict[int, tuple[float, float]] = {}
-        self._paused_at: int | None = None
+        self._paused_at: tuple[int, int] | None = None
         # Blender knows a timer by its address, and a bound method has a new one each time.
         self._timer = self._tick
         add = bpy.types.SpaceView3D.draw_handler_add
@@ -133,7 +133,7 @@ class ViewportDrawing:
 
         Nothing may leave a handler: Blender would print it at every redraw.
         """
-        if self._paused_at == CHANGES.revision:
+        if self._paused_at == CHANGES.now:
             return
         self._paused_at = None
         try:
@@ -146,7 +146,7 @@ class ViewportDrawing:
             bpy.app.timers.register(self._timer, first_interval=_TICK)
 
     def _stop(self, problem: str, details: str) -> None:
-        self._paused_at = CHANGES.revision
+        self._paused_at = CHANGES.now
         STATUS.report(problem, details)
 
     def _draw_fluid(self, context: bpy.types.Context, started: float) -> None:

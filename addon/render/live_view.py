@@ -162,7 +162,7 @@ class LiveView:
     def pictures(self) -> list[Picture]:
         """The newest samples, all of one view and one size; the first looks through the centres of the pixels."""
         with self._changed:
-            return list(self._pictures)
+            return self._pictures[: self._view.most_pictures] if self._view is not None else []
 
     @property
     def failure(self) -> tuple[str, str] | None:

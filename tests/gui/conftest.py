@@ -1,6 +1,7 @@
 """Fixtures of the tests in a window; pytest finds them here."""
 
 import ctypes
+import importlib
 
 import bpy
 import pytest
@@ -36,3 +37,28 @@ def new_file(registered_package):
 def fluid(registered_package):
     """The fluid in all viewports."""
     return FluidViews(registered_package)
+
+
+@pytest.fixture
+def drawn_panels(meniscus, monkeypatch):
+    """The names of the panels that were drawn, closed ones opened: ask for it before the file, which keeps what is open."""
+    panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
+    names = []
+
+    def recorded(draw):
+        def draw_and_record(panel, context):
+            draw(panel, context)
+            names.append(type(panel).__name__)
+
+        return draw_and_record
+
+    panels.unregister()
+    with monkeypatch.context() as patch:
+        for panel in panels._CLASSES:
+            if issubclass(panel, bpy.types.Panel):
+                patch.setattr(panel, "bl_options", set(), raising=False)
+                patch.setattr(panel, "draw", recorded(panel.draw))
+        panels.register()
+        yield names
+        panels.unregister()
+    panels.register()

@@ -1,7 +1,5 @@
 """The extension in a Blender that has a window: what it draws, and that it leaves Blender's own drawing alone."""
 
-import importlib
-
 import bpy
 import pytest
 from event_loop import wait_until
@@ -26,33 +24,14 @@ def properties_editor():
     return next(area for area in screen.areas if area.type == "PROPERTIES")
 
 
-@pytest.fixture
-def drawn_panels(meniscus, monkeypatch):
-    """The names of the panels that were drawn, closed ones opened: ask for it before the file, which keeps what is open."""
-    panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
-    names = []
-
-    def recorded(draw):
-        def draw_and_record(panel, context):
-            draw(panel, context)
-            names.append(type(panel).__name__)
-
-        return draw_and_record
-
-    panels.unregister()
-    with monkeypatch.context() as patch:
-        for panel in panels._CLASSES:
-            patch.setattr(panel, "bl_options", set())
-            patch.setattr(panel, "draw", recorded(panel.draw))
-        panels.register()
-        yield names
-        panels.unregister()
-    panels.register()
-
-
 @pytest.mark.parametrize(
     ("tab", "panel"),
-    [("OBJECT", "MENISCUS_PT_object"), ("PARTICLES", "MENISCUS_PT_particles"), ("RENDER", "MENISCUS_PT_scene")],
+    [
+        ("OBJECT", "MENISCUS_PT_object"),
+        ("PARTICLES", "MENISCUS_PT_particles"),
+        ("DATA", "MENISCUS_PT_data"),
+        ("RENDER", "MENISCUS_PT_scene"),
+    ],
 )
 @pytest.mark.parametrize("mode", ["PARTICLE", "ATTRIBUTE", "FIXED"])
 def test_panels_draw(drawn_panels, emitter, properties_editor, tab, panel, mode):
