@@ -27,7 +27,7 @@ NumberedItem = tuple[str, str, str, int]
 
 
 BACKENDS: tuple[Item, ...] = (
-    ("auto", "Automatic", "The graphics card where it can, else the processor"),
+    ("auto", "Automatic", "What the fastest method runs on"),
     ("gpu", "GPU", "The graphics card, through OpenGL"),
     ("cpu", "CPU", "The processor"),
 )

@@ -19,7 +19,7 @@ from ..fluid.passes import PASSES, checked_passes
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
-from .registry import create_method, method_infos, runs_in_software_opengl
+from .registry import create_method, method_infos
 from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
 from .thickness import at_pixels, thickness_image
 
@@ -253,10 +253,7 @@ class _Choice:
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
-    """The method asked for, or the preferred one that runs here on the back-end asked for and finds these attributes.
-
-    Left to choose, OpenGL is taken where it is hardware: in software it is slower than the CPU back-end.
-    """
+    """The method asked for, or the fastest one that runs here on the back-end asked for and finds these attributes."""
     if backend not in BACKENDS:
         raise InputError(f"Unknown back-end '{backend}': choose one of {', '.join(BACKENDS)}")
     if method != "auto":
@@ -265,11 +262,9 @@ def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) ->
     for info in method_infos():
         if backend in ("auto", info.backend):
             try:
-                if backend == "auto" and runs_in_software_opengl(info):
-                    raise DeviceError(f"{info.label} would run in software, where the processor itself is faster")
                 if missing := _passes_without(attributes - info.attributes):
                     raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
-                reason = str(problems[0]) if problems else "The first choice, and it runs here"
+                reason = str(problems[0]) if problems else "The fastest method, and it runs here"
                 return _Choice(*create_method(info.name), reason)
             except (DeviceError, InputError) as error:
                 problems.append(error)

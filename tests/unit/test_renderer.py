@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -95,7 +94,7 @@ def test_cancelling_stops_the_render():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, depth_peeling"),
+        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, tile_caster, depth_peeling"),
         ({"backend": "tpu"}, "Unknown back-end 'tpu'"),
         ({"method": "depth_peeling", "backend": "cpu"}, "runs on the back-end 'gpu', not on 'cpu'"),
         ({"passes": ("dpeth",)}, "Unknown pass 'dpeth'"),
@@ -116,13 +115,23 @@ def no_opengl(monkeypatch):
     monkeypatch.setattr(method, "create", fail)
 
 
-@pytest.mark.parametrize(("is_software", "expected"), [(True, "tile_caster"), (False, "depth_peeling")])
-def test_software_opengl_is_left_alone_unless_asked_for(monkeypatch, is_software, expected):
-    stand_in = SimpleNamespace(is_software=is_software)
-    monkeypatch.setattr(registry.gpu(), "shared_context", lambda: stand_in)
-    monkeypatch.setattr(renderer, "create_method", lambda name: (name, None))
-    assert renderer._pick_method("auto", "auto", frozenset())[0] == expected
-    assert renderer._pick_method("auto", "gpu", frozenset())[0] == "depth_peeling"
+def test_the_fastest_method_is_taken_and_says_why():
+    assert render(backend="auto").info.method == "tile_caster"
+    assert "fastest" in render(backend="auto").info.reason
+    assert render(backend="auto", method="tile_caster").info.reason == "Chosen in the settings"
+
+
+def test_where_the_fastest_method_cannot_run_the_next_one_does_and_says_why(monkeypatch):
+    create = renderer.create_method
+
+    def fail(name):
+        if name == "tile_caster":
+            raise DeviceError("The native module is missing")
+        return create(name)
+
+    monkeypatch.setattr(renderer, "create_method", fail)
+    info = render(backend="auto", passes=("depth", "normal")).info
+    assert (info.method, info.reason) == ("depth_peeling", "The native module is missing")
 
 
 def test_without_opengl_the_cpu_does_the_work(no_opengl):
@@ -204,4 +213,4 @@ def test_a_missing_package_of_opengl_is_one_sentence(monkeypatch):
     monkeypatch.setattr(registry.importlib, "import_module", import_module)
     with pytest.raises(DeviceError, match=r"a package is missing \(No module named 'moderngl'\); reinstall the extension"):
         render(backend="auto", method="depth_peeling")
-    assert [bool(status.problem) for status in meniscus.methods()] == [True, False]
+    assert [bool(status.problem) for status in meniscus.methods()] == [False, True]

@@ -76,10 +76,10 @@ def test_every_shader_file_is_read():
     assert {"lib/kernel.glsl", "methods/depth_peeling/peel.frag", "methods/depth_peeling/sphere.vert"} <= files.keys()
 
 
-def test_every_shader_of_a_method_is_in_one_of_its_programs():
-    used = {
-        source for program in shader_lint.method_programs() for stage in program.sources().values() for source in stage.files
-    }
+def test_every_shader_is_in_one_of_the_programs():
+    programs = [*shader_lint.method_programs(), *shader_lint.viewport_programs()]
+    used = {source for program in programs for stage in program.sources().values() for source in stage.files}
+    used |= {f"viewport/{program.name}_params.glsl" for program in shader_lint.viewport_programs()}
     assert used == shader_lint.shader_files().keys()
 
 
