@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import bpy
 from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
 
 from ..fluid.image import RenderInfo
 from .presets import PRESETS
@@ -44,35 +45,48 @@ class MENISCUS_UL_sources(bpy.types.UIList):
         row.prop(item, "name", text="", emboss=False, icon="PARTICLES" if is_emitter else "POINTCLOUD_DATA")
         row.prop(item, "hide_viewport", text="", emboss=False, icon_only=True)
 
-    def filter_items(self, _context, data, _property) -> tuple[list[int], list[int]]:
-        return [self.bitflag_filter_item if flag else 0 for flag in source_flags(data)], []
+    def filter_items(self, _context, data, name) -> tuple[list[int], list[int]]:
+        objects, flags, helper = getattr(data, name), source_flags(data), bpy.types.UI_UL_list
+        shown = [self.bitflag_filter_item] * len(flags)
+        if self.filter_name:
+            shown = helper.filter_items_by_name(self.filter_name, self.bitflag_filter_item, objects, "name")
+        # Blender inverts what is returned; what is no source is to stay hidden then as well.
+        hidden = self.bitflag_filter_item if self.use_filter_invert else 0
+        order = helper.sort_items_by_name(objects, "name") if self.use_filter_sort_alpha else []
+        return [bit if flag else hidden for bit, flag in zip(shown, flags, strict=True)], order
 
 
-class MENISCUS_MT_presets(bpy.types.Menu):
-    """Looks that come with Meniscus, and your own"""
+class MENISCUS_PT_presets(PresetPanel, bpy.types.Panel):
+    """Looks that come with Meniscus, and the user's own, which can be added and removed."""
 
     bl_label = "Presets"
     preset_subdir = "meniscus"
     preset_operator = "script.execute_preset"
+    preset_add_operator = "meniscus.add_preset"
 
     def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        column.emboss = "PULLDOWN_MENU"
         for name, preset in PRESETS.items():
-            self.layout.operator("meniscus.apply_preset", text=preset.label).preset = name
+            column.operator("meniscus.apply_preset", text=preset.label).preset = name
+        self.layout.separator()
         if bpy.utils.preset_paths(self.preset_subdir):
-            self.layout.separator()
-            bpy.types.Menu.draw_preset(self, context)
+            super().draw(context)
+        else:  # before the first of the user's own there is no folder, and Blender would complain of that
+            row = self.layout.row(align=True)
+            row.prop(context.window_manager, "preset_name", text="")
+            row.operator(self.preset_add_operator, text="", icon="ADD").name = context.window_manager.preset_name
 
 
 class MENISCUS_OT_add_preset(AddPresetBase, bpy.types.Operator):
-    """Keep the scene's kernel, isovalue and look under a name of your own, or remove the one that is shown"""
+    """Keep the scene's kernel, isovalue and look under a name of your own, or remove what was kept"""
 
     bl_idname = "meniscus.add_preset"
     bl_label = "Add Preset"
-    preset_menu = "MENISCUS_MT_presets"
+    preset_menu = "MENISCUS_PT_presets"
     preset_subdir = "meniscus"
-    preset_defines: ClassVar = ["settings = bpy.context.scene.meniscus"]
     preset_values: ClassVar = [
-        f"settings.{name}"
+        f"bpy.context.scene.meniscus.{name}"
         for name in (
             *("kernel", "isovalue", "style", "color", "ambient", "roughness", "metallic", "light", "light_strength"),
             *("absorption", "ior", "use_speed_range", "speed_min", "speed_max", "depth_contrast", "depth_contrast_radius"),
@@ -137,7 +151,7 @@ class MENISCUS_PT_sidebar_look(_SidebarPanel, bpy.types.Panel):
     bl_parent_id = "MENISCUS_PT_sidebar"
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        _draw_presets(self.layout)
+        MENISCUS_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         _draw_look(self.layout, context.scene.meniscus)
@@ -235,7 +249,7 @@ class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
     bl_context = "render"
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        _draw_presets(self.layout)
+        MENISCUS_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         _draw_surface(self.layout, context.scene.meniscus)
@@ -300,12 +314,6 @@ def _draw_look(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
         radius.prop(settings, "depth_contrast_radius")
 
 
-def _draw_presets(layout: bpy.types.UILayout) -> None:
-    row = layout.row(align=True)
-    row.menu("MENISCUS_MT_presets", text="", icon="PRESET")
-    row.operator("meniscus.add_preset", text="", icon="ADD")
-
-
 def _draw_problem(layout: bpy.types.UILayout) -> None:
     if STATUS.problem:
         box = layout.box()
@@ -353,7 +361,7 @@ def _columns(layout: bpy.types.UILayout) -> tuple[bpy.types.UILayout, bpy.types.
 
 _CLASSES = (
     MENISCUS_UL_sources,
-    MENISCUS_MT_presets,
+    MENISCUS_PT_presets,
     MENISCUS_OT_add_preset,
     MENISCUS_PT_sidebar,
     MENISCUS_PT_sidebar_source,

@@ -62,12 +62,18 @@ def use_as_fluid(item: bpy.types.Object) -> None:
 
 
 def use_no_more(item: bpy.types.Object) -> None:
-    """Undo :func:`use_as_fluid`."""
+    """Undo :func:`use_as_fluid`; particle settings that another source shares stay as they are."""
     item.meniscus.use_fluid = False
     for settings in _particle_settings(item):
-        if HIDDEN_DISPLAY in settings:
-            settings.display_method = settings[HIDDEN_DISPLAY]
+        if HIDDEN_DISPLAY in settings and not _is_of_source(settings):
+            if settings.display_method == "NONE":  # else the user has chosen another since
+                settings.display_method = settings[HIDDEN_DISPLAY]
             del settings[HIDDEN_DISPLAY]
+
+
+def _is_of_source(settings: bpy.types.ParticleSettings) -> bool:
+    users = bpy.data.user_map(subset=[settings])[settings]
+    return any(isinstance(user, bpy.types.Object) and user.meniscus.use_fluid for user in users)
 
 
 def _particle_settings(item: bpy.types.Object) -> list[bpy.types.ParticleSettings]:

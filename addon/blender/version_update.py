@@ -63,7 +63,7 @@ def _mark(*_: object) -> None:
 
 
 _HANDLERS = {"load_post": _update_file, "save_pre": _mark, "blend_import_post": _update_imported}
-"""There is none for what is appended before 4.3; it is brought up to date when the file is next opened."""
+"""Before 4.3 there is none for what is appended: an old scene looks as a new one does there."""
 
 
 def register() -> None:

@@ -41,6 +41,43 @@ def test_an_emitter_becomes_a_source_and_its_dots_are_hidden_until_it_is_removed
     assert len(settings.keys()) == 0
 
 
+def test_shared_particles_stay_hidden_until_the_last_of_their_sources_is_removed(scene):
+    first, second = cube(scene, "A"), cube(scene, "B")
+    settings = add_particle_system(first, display_method="CROSS").particle_system.settings
+    add_particle_system(second).particle_system.settings = settings
+    select(first, second)
+    bpy.ops.meniscus.add_sources()
+    bpy.ops.meniscus.remove_source()
+    assert settings.display_method == "NONE"
+    bpy.ops.meniscus.remove_source()
+    assert settings.display_method == "CROSS"
+
+
+def test_a_display_that_was_chosen_since_stays(scene):
+    emitter = cube(scene)
+    settings = add_particle_system(emitter, display_method="CROSS").particle_system.settings
+    select(emitter)
+    bpy.ops.meniscus.add_sources()
+    settings.display_method = "CIRC"
+    bpy.ops.meniscus.remove_source()
+    assert (settings.display_method, len(settings.keys())) == ("CIRC", 0)
+
+
+def test_adding_a_source_can_be_undone(scene):
+    emitter = cube(scene)
+    add_particle_system(emitter, display_method="CROSS")
+    select(emitter)
+    bpy.ops.ed.undo_push(message="Before")
+    bpy.ops.meniscus.add_sources()
+    bpy.ops.ed.undo_push(message="Use as Fluid")
+    bpy.ops.ed.undo()
+    emitter = bpy.data.objects["Cube"]
+    assert not emitter.meniscus.use_fluid
+    assert emitter.particle_systems[0].settings.display_method == "CROSS"
+    bpy.ops.ed.redo()
+    assert bpy.data.objects["Cube"].meniscus.use_fluid
+
+
 def test_hair_keeps_its_display(scene):
     emitter = cube(scene)
     hair = add_particle_system(emitter, type="HAIR", display_method="PATH").particle_system.settings

@@ -25,3 +25,24 @@ def test_the_scene_comes_before_the_user(preferences):
         assert preferences.backend_of(bpy.context.scene) == "gpu"
     finally:
         chosen.backend = "auto"
+
+
+def test_the_command_line_asks_its_arguments_then_the_scene_then_the_user(preferences, meniscus, tmp_path):
+    package = f"{meniscus.__name__}.addon.blender"
+    command_line, render_frames = (importlib.import_module(f"{package}.{name}") for name in ("command_line", "render_frames"))
+    arguments = ["render", "--frames", "1", "--output", str(tmp_path / "fluid.exr")]
+    scene, chosen = bpy.context.scene, preferences.preferences()
+
+    def job(*more):
+        return command_line._job(command_line.parse_arguments([*arguments, *more]))
+
+    chosen.backend, chosen.threads = "cpu", 3
+    try:
+        assert (job().backend, job("--backend", "gpu").backend) == ("cpu", "gpu")
+        assert render_frames._threads(scene) == 3
+        scene.render.threads_mode, scene.render.threads = "FIXED", 2
+        assert render_frames._threads(scene) == 2
+        scene.meniscus.backend = "gpu"
+        assert job().backend == "gpu"
+    finally:
+        chosen.backend, chosen.threads = "auto", 0

@@ -1,5 +1,6 @@
 """As a new user would: select an emitter, one click, it flows. And the panels of the sidebar."""
 
+import importlib
 from contextlib import suppress
 
 import bpy
@@ -65,6 +66,40 @@ def test_panels_of_the_sidebar_draw(drawn_panels, fluid, sidebar):
     add_points(bpy.context.scene.collection, points=[(2, 0, 0)], radius=1.0)
     rest = {f"MENISCUS_PT_sidebar_{name}" for name in ("source", "look", "surface", "quality", "statistics")}
     wait_until(lambda: rest <= set(drawn_panels), "all panels of the sidebar")
+
+
+@pytest.mark.parametrize(
+    ("search", "inverted", "expected"),
+    [("", False, {"Drop", "Splash"}), ("spl", False, {"Splash"}), ("spl", True, {"Drop"})],
+)
+def test_the_list_shows_sources_only_and_can_be_searched(meniscus, monkeypatch, fluid, sidebar, search, inverted, expected):
+    sources_list = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels").MENISCUS_UL_sources
+    draw, filter_items, rows = sources_list.draw_item, sources_list.filter_items, set()
+
+    # Blender counts the arguments of what it calls.
+    def recorded(self, context, layout, data, item, icon, active_data, active_property):
+        rows.add(item.name)
+        draw(self, context, layout, data, item, icon, active_data, active_property)
+
+    def searched(self, context, data, name):
+        self.filter_name, self.use_filter_invert = search, inverted
+        return filter_items(self, context, data, name)
+
+    monkeypatch.setattr(sources_list, "draw_item", recorded)
+    monkeypatch.setattr(sources_list, "filter_items", searched)
+    for name in ("Drop", "Splash"):
+        add_points(bpy.context.scene.collection, name, points=[(2, 0, 0)], radius=1.0)
+    fluid.settled(sidebar)
+    rows.clear()
+    next(region for region in sidebar.area.regions if region.type == "UI").tag_redraw()
+    wait_until(lambda: rows, "the list")
+    assert rows == expected
+
+
+def test_the_presets_open(drawn_panels, fluid, sidebar, meniscus):
+    with sidebar.override():
+        bpy.ops.wm.call_panel(name="MENISCUS_PT_presets")
+    wait_until(lambda: "MENISCUS_PT_presets" in drawn_panels, "the presets")
 
 
 @pytest.mark.parametrize("style", ["studio", "water", "headlight", "flat", "normal", "depth", "speed", "id"])
