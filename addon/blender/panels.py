@@ -45,15 +45,19 @@ class MENISCUS_UL_sources(bpy.types.UIList):
         row.prop(item, "name", text="", emboss=False, icon="PARTICLES" if is_emitter else "POINTCLOUD_DATA")
         row.prop(item, "hide_viewport", text="", emboss=False, icon_only=True)
 
+    def draw_filter(self, _context, layout) -> None:
+        # No button to invert: Blender inverts what is filtered in some versions only, and would show what is no source.
+        row = layout.row(align=True)
+        row.prop(self, "filter_name", text="", icon="VIEWZOOM")
+        row.prop(self, "use_filter_sort_alpha", text="", icon="SORTALPHA")
+
     def filter_items(self, _context, data, name) -> tuple[list[int], list[int]]:
         objects, flags, helper = getattr(data, name), source_flags(data), bpy.types.UI_UL_list
-        shown = [self.bitflag_filter_item] * len(flags)
+        found = [self.bitflag_filter_item] * len(flags)
         if self.filter_name:
-            shown = helper.filter_items_by_name(self.filter_name, self.bitflag_filter_item, objects, "name")
-        # Blender inverts what is returned; what is no source is to stay hidden then as well.
-        hidden = self.bitflag_filter_item if self.use_filter_invert else 0
+            found = helper.filter_items_by_name(self.filter_name, self.bitflag_filter_item, objects, "name")
         order = helper.sort_items_by_name(objects, "name") if self.use_filter_sort_alpha else []
-        return [bit if flag else hidden for bit, flag in zip(shown, flags, strict=True)], order
+        return [bit if flag else 0 for bit, flag in zip(found, flags, strict=True)], order
 
 
 class MENISCUS_PT_presets(PresetPanel, bpy.types.Panel):

@@ -69,31 +69,40 @@ def test_panels_of_the_sidebar_draw(drawn_panels, fluid, sidebar):
 
 
 @pytest.mark.parametrize(
-    ("search", "inverted", "expected"),
-    [("", False, {"Drop", "Splash"}), ("spl", False, {"Splash"}), ("spl", True, {"Drop"})],
+    ("search", "sorted_by_name", "expected"),
+    [("", False, ["Splash", "Drop"]), ("", True, ["Drop", "Splash"]), ("spl", False, ["Splash"])],
 )
-def test_the_list_shows_sources_only_and_can_be_searched(meniscus, monkeypatch, fluid, sidebar, search, inverted, expected):
+def test_the_list_has_sources_only_and_can_be_searched_and_sorted(
+    meniscus, monkeypatch, fluid, sidebar, search, sorted_by_name, expected
+):
     sources_list = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels").MENISCUS_UL_sources
-    draw, filter_items, rows = sources_list.draw_item, sources_list.filter_items, set()
+    draw, draw_filter, filter_items = sources_list.draw_item, sources_list.draw_filter, sources_list.filter_items
+    rows, is_drawn = [], []
 
     # Blender counts the arguments of what it calls.
     def recorded(self, context, layout, data, item, icon, active_data, active_property):
-        rows.add(item.name)
+        rows.append(item.name)
         draw(self, context, layout, data, item, icon, active_data, active_property)
 
+    def recorded_filter(self, context, layout):
+        draw_filter(self, context, layout)
+        is_drawn.append(True)
+
     def searched(self, context, data, name):
-        self.filter_name, self.use_filter_invert = search, inverted
+        self.use_filter_show, self.filter_name, self.use_filter_sort_alpha = True, search, sorted_by_name
         return filter_items(self, context, data, name)
 
     monkeypatch.setattr(sources_list, "draw_item", recorded)
+    monkeypatch.setattr(sources_list, "draw_filter", recorded_filter)
     monkeypatch.setattr(sources_list, "filter_items", searched)
-    for name in ("Drop", "Splash"):
+    for name in ("Splash", "Drop"):
         add_points(bpy.context.scene.collection, name, points=[(2, 0, 0)], radius=1.0)
     fluid.settled(sidebar)
     rows.clear()
     next(region for region in sidebar.area.regions if region.type == "UI").tag_redraw()
-    wait_until(lambda: rows, "the list")
-    assert rows == expected
+    wait_until(lambda: rows and is_drawn, "the list")
+    assert rows[: len(expected)] == expected
+    assert set(rows) == set(expected)
 
 
 def test_the_presets_open(drawn_panels, fluid, sidebar, meniscus):
