@@ -32,6 +32,7 @@ def add_particle_system(
     system.seed = seed
     system.point_cache.frame_start, system.point_cache.frame_end = 1, frame_end
     settings = system.settings
+    settings.display_method = "NONE"  # the fluid takes the place of Blender's dots
     settings.frame_start = settings.frame_end = 1
     settings.particle_size = size
     settings.lifetime = lifetime
