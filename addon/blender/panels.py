@@ -10,6 +10,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from ..fluid.image import RenderInfo
+from ..fluid.look import LOOK_STYLES
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
 from .texture_sharing import SHARING
@@ -29,7 +30,6 @@ _LOOK_SETTINGS: dict[str, tuple[str, ...]] = {
     "speed": (),
     "id": (),
 }
-_LIT = ("studio", "water", "headlight")
 
 _STAGES_SHOWN = 8
 
@@ -311,7 +311,7 @@ def _draw_look(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
         ends.active = settings.use_speed_range
         ends.prop(settings, "speed_min")
         ends.prop(settings, "speed_max")
-    if settings.style in _LIT:
+    if LOOK_STYLES[settings.style].is_lit:
         layout.prop(settings, "depth_contrast")
         radius = layout.column()
         radius.active = settings.depth_contrast > 0

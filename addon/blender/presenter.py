@@ -56,6 +56,7 @@ class _Sample:
 
     picture: Picture
     textures: Textures
+    importance: gpu.types.GPUTexture | None
     thickness: gpu.types.GPUTexture | None
 
 
@@ -148,6 +149,7 @@ class Presenter:
             "depth_tx": depth,
             "normal_tx": sample.textures["normal"],
             "value_tx": values[0] if values else depth,
+            "importance_tx": sample.importance or depth,
             "thickness_tx": sample.thickness or depth,
             "table_tx": self._table_texture(transform) or depth,
         }
@@ -212,8 +214,8 @@ def _compiled(source: ViewportProgram) -> gpu.types.GPUShader:
 
 
 def _uploaded_sample(picture: Picture) -> _Sample:
-    thickness = None if picture.thickness is None else uploaded(picture.thickness)
-    return _Sample(picture, textures_of(picture.image), thickness)
+    importance, thickness = (None if beside is None else uploaded(beside) for beside in (picture.importance, picture.thickness))
+    return _Sample(picture, textures_of(picture.image), importance, thickness)
 
 
 class _State:
@@ -237,7 +239,7 @@ def _shade_params(sample: _Sample, look: Look, transform: DisplayTransform) -> n
         *camera.world_from_view.T,
         (window.left, window.bottom, window.right, window.top),
         (*look.light_direction, look.light_strength),
-        (look.absorption, look.ior, look.metallic, 0.0),
+        (look.absorption, look.ior, look.metallic, look.depth_contrast if sample.importance is not None else 0.0),
         (*look.color, float("color" in sample.textures)),
         (*picture.depth_range, *(look.speed_range or picture.speed_range)),
         (look.ambient, look.roughness, list(LOOK_STYLES).index(look.style), float(camera.is_perspective)),

@@ -225,13 +225,14 @@ class ViewportDrawing:
 
 
 def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
-    settings, chosen = scene.meniscus, preferences()
+    settings, chosen, style = scene.meniscus, preferences(), LOOK_STYLES[look.style]
     return View(
         balls,
         seen.camera.cropped(),
         read_field(scene),
         passes=_passes(look, balls),
-        uses_thickness=LOOK_STYLES[look.style].uses_thickness,
+        uses_thickness=style.uses_thickness,
+        contrast_radius=look.depth_contrast_radius if look.depth_contrast > 0 and style.is_lit else None,
         method=settings.method,
         backend=backend_of(scene),
         threads=chosen.threads,

@@ -22,8 +22,8 @@ class LookStyle:
         What it needs of the surface beside depth and normal, by pass name.
     uses_thickness
         Whether it needs the length of the way through the fluid.
-    uses_scene
-        Whether it shows what is behind the fluid.
+    is_lit
+        Whether there is light, and with it depth contrast.
     is_data
         Whether its colours stand for numbers, so that no view transform may change them.
     """
@@ -33,23 +33,23 @@ class LookStyle:
     description: str
     passes: tuple[str, ...] = ()
     uses_thickness: bool = False
-    uses_scene: bool = False
+    is_lit: bool = False
     is_data: bool = False
 
 
 LOOK_STYLES: dict[str, LookStyle] = {
     style.name: style
     for style in (
-        LookStyle("studio", "Studio", "Key, fill and rim light that turn with the view", ("color",)),
+        LookStyle("studio", "Studio", "Key, fill and rim light that turn with the view", ("color",), is_lit=True),
         LookStyle(
             "water",
             "Water",
-            "Reflects a sky, bends what is behind it and takes light away by its thickness",
+            "Reflects a sky, and takes light of what is behind it away by its thickness",
             ("color",),
             uses_thickness=True,
-            uses_scene=True,
+            is_lit=True,
         ),
-        LookStyle("headlight", "Headlight", "Light from the eye, for measuring and for plain prints", ("color",)),
+        LookStyle("headlight", "Headlight", "Light from the eye, for measuring and for plain prints", ("color",), is_lit=True),
         LookStyle("flat", "Flat", "The colour of the balls, without light", ("color",)),
         LookStyle("normal", "Normal", "The direction of the surface as a colour, in world space", is_data=True),
         LookStyle("depth", "Depth", "Light where the surface is near, dark where it is far", is_data=True),

@@ -20,6 +20,7 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
+from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
@@ -46,6 +47,8 @@ class View:
         What is needed of the surface.
     uses_thickness
         Whether the length of the way through the fluid is needed.
+    contrast_radius
+        Of the depth contrast, see :class:`look.Look`; None where there is none.
     method, backend, threads
         As for :func:`renderer.render`.
     samples
@@ -61,6 +64,7 @@ class View:
     field: Field
     passes: tuple[str, ...] = ("depth", "normal")
     uses_thickness: bool = False
+    contrast_radius: float | None = None
     method: str = "auto"
     backend: str = "auto"
     threads: int = 0
@@ -78,7 +82,7 @@ class View:
         )
 
     def _means(self) -> tuple[object, ...]:
-        return self.field, self.passes, self.uses_thickness, self.method, self.backend
+        return self.field, self.passes, self.uses_thickness, self.contrast_radius, self.method, self.backend
 
     @property
     def most_pictures(self) -> int:
@@ -99,6 +103,8 @@ class Picture:
         Depth, normal and what else the view asks for; its camera has the size of the image.
     view
         What it shows.
+    importance
+        (height, width) of the image, see :func:`depth_contrast.spatial_importance`; None where it is not needed.
     thickness
         (height, width) at a resolution of its own, see :func:`thickness.thickness_image`; None where it is not needed.
     depth_range
@@ -109,6 +115,7 @@ class Picture:
 
     image: ImageBuffers | DeviceImage
     view: View
+    importance: npt.NDArray[np.float32] | None = None
     thickness: npt.NDArray[np.float32] | None = None
 
     @property
@@ -293,8 +300,9 @@ class LiveRenderer:
                     passes=view.passes,
                     is_cancelled=is_cancelled,
                     threads=view.threads,
+                    is_read_back=view.contrast_radius is not None,
                 )
-                thickness = thickness_image(view.balls, camera, view.field) if view.uses_thickness else None
+                picture = _picture(image, view)
         except CancelledError:
             return
         except Exception as failure:  # noqa: BLE001 - whatever it is, the user sees it and the thread goes on
@@ -305,7 +313,7 @@ class LiveRenderer:
             return
         with self._changed:
             if is_first or view.shows_the_same(live._view):
-                live._accept(Picture(image, view, thickness), milliseconds["picture"] / 1e3)
+                live._accept(picture, milliseconds["picture"] / 1e3)
                 self._changed.notify_all()
 
     def _is_overtaken(self, live: LiveView, view: View) -> bool:
@@ -317,6 +325,16 @@ class LiveRenderer:
                 or not view.shows_the_same(live._view)
                 or any(other._stage() == 0 for other in self._views)
             )
+
+
+def _picture(image: ImageBuffers | DeviceImage, view: View) -> Picture:
+    """An image with what the look needs beside it."""
+    importance = thickness = None
+    if view.contrast_radius is not None and isinstance(image, ImageBuffers):
+        importance = spatial_importance(image["depth"], image.hit, image.camera, view.contrast_radius)
+    if view.uses_thickness:
+        thickness = thickness_image(view.balls, image.camera, view.field)
+    return Picture(image, view, importance, thickness)
 
 
 def _offset(sample: int) -> tuple[float, float]:

@@ -113,10 +113,11 @@ def render_to_show(
     passes: Iterable[str] = ("depth", "normal"),
     is_cancelled: Callable[[], bool] | None = None,
     threads: int = 0,
+    is_read_back: bool = False,
 ) -> ImageBuffers | DeviceImage:
     """Render the surface of a fluid for Blender to draw.
 
-    The parameters and the errors are those of :func:`render`.
+    The parameters and the errors are those of :func:`render`; `is_read_back` asks for ImageBuffers in any case.
 
     Returns
     -------
@@ -125,7 +126,8 @@ def render_to_show(
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, None, is_cancelled, None, threads)
     runner = shot.choice.runner
-    if isinstance(runner, DeviceMethod) and runner.shares_textures and camera.region is None and shot.can_stay_on_device:
+    can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
+    if can_stay and isinstance(runner, DeviceMethod) and runner.shares_textures:
         return shot.device_image(runner.find_surface_on_device(shot.request))
     return shot.image(runner.find_surface(shot.request))
 

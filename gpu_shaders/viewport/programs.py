@@ -60,7 +60,7 @@ class ViewportProgram:
 SHADE = ViewportProgram(
     "shade",
     "ShadeParams",
-    ("depth_tx", "normal_tx", "value_tx", "thickness_tx", "table_tx"),
+    ("depth_tx", "normal_tx", "value_tx", "importance_tx", "thickness_tx", "table_tx"),
     constants=tuple(look_constants().items()),
 )
 SHOW = ViewportProgram("show", "ShowParams", ("depth_tx", "shaded_tx"), ("place",), writes_depth=True)

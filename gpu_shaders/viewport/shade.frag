@@ -45,7 +45,7 @@ void main() {
     seen.ball = value.x;
     seen.depth = depth;
     seen.thickness = thickness_at(gl_FragCoord.xy / size);
-    seen.contrast = 1.0;
+    seen.contrast = params.optics.w > 0.0 ? 1.0 + tanh(params.optics.w * texelFetch(importance_tx, pixel, 0).x) : 1.0;
     seen.up = view_from_world * vec3(0.0, 0.0, 1.0);
     LookSettings settings;
     settings.ambient = params.surface.x;

@@ -5,7 +5,7 @@ struct ShadeParams {
     vec4 window;
     // Towards the light, view space; its strength.
     vec4 light;
-    // Absorption by Blender unit, index of refraction, metallic; unused.
+    // Absorption by Blender unit, index of refraction, metallic; strength of the depth contrast.
     vec4 optics;
     // Linear Rec.709; 1 where the balls have colours of their own, else 0.
     vec4 base;

@@ -140,6 +140,18 @@ def test_a_look_needs_no_new_image_where_the_old_one_has_all_of_it(fluid, new_fi
     assert live.revision == revision
 
 
+def test_depth_contrast_shows(fluid, new_file):
+    shown = fluid.prepare()
+    add_points(bpy.context.scene.collection, points=[(2, 0, 0), (2.6, 1.6, 0)], radius=1.0)
+    settings = bpy.context.scene.meniscus
+    settings.style = "studio"
+    plain = fluid.settled(shown)
+    settings.depth_contrast = 6.0
+    assert np.abs(fluid.settled(shown).astype(int) - plain).max() > 15
+    settings.depth_contrast = 0.0
+    np.testing.assert_array_equal(fluid.settled(shown), plain)
+
+
 def test_a_problem_is_shown_and_can_be_copied(drawn_panels, fluid, sidebar):
     item = add_points(bpy.context.scene.collection, points=[(2, 0, 0)], radius=1.0)
     fluid.settled(sidebar)
