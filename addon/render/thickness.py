@@ -23,7 +23,7 @@ FloatArray = npt.NDArray[np.float32]
 LONGEST_SIDE = 256
 """Pixels of the longer side of an image of thickness."""
 
-_SAMPLES = 16
+_SAMPLES = 24
 _SPREAD = 0.4
 """Standard deviation of the blur by a ball's influence radius; the kernels' own lie around it."""
 
@@ -74,18 +74,19 @@ def at_pixels(image: FloatArray, camera: Camera, hit: npt.NDArray[np.bool_]) -> 
 
 
 def typical_density(balls: Balls, field: Field) -> float:
-    """Density inside the fluid: the mean of those at the centres of some balls."""
+    """Density inside the fluid: the median of those at the centres of some balls."""
     known = _densities.setdefault(balls, {})
     if field not in known:
-        known[field] = _mean_density(balls, KERNELS[field.kernel])
+        known[field] = _median_density(balls, KERNELS[field.kernel])
     return known[field]
 
 
-def _mean_density(balls: Balls, kernel: Kernel) -> float:
-    chosen = np.linspace(0, len(balls) - 1, min(_SAMPLES, len(balls))).round().astype(int)
+def _median_density(balls: Balls, kernel: Kernel) -> float:
+    # At random, because balls often come in an order; the same ones each time.
+    chosen = np.random.default_rng(0).permutation(len(balls))[:_SAMPLES]
     centers = balls.positions[chosen].astype(np.float64)
     densities = [_density_at(center, balls, kernel) for center in centers]
-    return max(float(np.mean(densities)), 1e-6)
+    return max(float(np.median(densities)), 1e-6) if densities else 1.0
 
 
 def _density_at(point: npt.NDArray[np.float64], balls: Balls, kernel: Kernel) -> float:
