@@ -350,8 +350,8 @@ def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
         names.label(text=name)
         values.label(text=value)
     _draw_text(layout, f"{info.reason}.", "INFO")
-    if STATUS.left_out:
-        _draw_text(layout, STATUS.left_out, "ERROR")
+    for note in STATUS.notes:
+        _draw_text(layout, note, "ERROR")
     if SHARING.problem and info.backend == "gpu":
         _draw_text(layout, f"{SHARING.problem}.", "INFO")
 

@@ -191,7 +191,7 @@ class ViewportDrawing:
     def _report(self, viewport: _Viewport, balls: Balls) -> None:
         pictures = viewport.live.pictures
         if pictures:
-            STATUS.show(pictures[0].image.info, balls.dropped_text)
+            STATUS.show(pictures[0].image.info, balls.dropped_text, self._transforms.problem)
         STATUS.report(*(viewport.live.failure or ("", "")))
 
     def _tick(self) -> float | None:

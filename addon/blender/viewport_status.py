@@ -17,8 +17,8 @@ class ViewportStatus:
         One sentence that says why nothing is drawn and what to do; empty where all is well.
     details
         What to send with a report of the problem, such as the traceback; empty where there is nothing more to say.
-    left_out
-        One sentence about unusable balls, empty where there were none.
+    notes
+        Sentences on what is drawn, but not quite as it should be, such as that unusable balls were left out.
     info
         How the newest image came about; None before the first.
     has_news
@@ -27,7 +27,7 @@ class ViewportStatus:
 
     problem: str = ""
     details: str = ""
-    left_out: str = ""
+    notes: tuple[str, ...] = ()
     info: RenderInfo | None = None
     has_news: bool = False
 
@@ -36,15 +36,16 @@ class ViewportStatus:
         self.has_news |= problem != self.problem
         self.problem, self.details = problem, details
 
-    def show(self, info: RenderInfo, left_out: str) -> None:
+    def show(self, info: RenderInfo, *notes: str) -> None:
         """Say how the newest image came about."""
-        self.has_news |= info is not self.info
-        self.info, self.left_out = info, left_out
+        told = tuple(filter(None, notes))
+        self.has_news |= info is not self.info or told != self.notes
+        self.info, self.notes = info, told
 
     def clear(self) -> None:
         """Say nothing."""
         self.report("", "")
-        self.info, self.left_out = None, ""
+        self.info, self.notes = None, ()
 
 
 STATUS = ViewportStatus()
