@@ -62,7 +62,7 @@ class _Sample:
 
 @dataclass
 class _Sum:
-    """Samples that were shaded, one look over another."""
+    """Samples that were shaded, one upon the other."""
 
     texture: gpu.types.GPUTexture
     framebuffer: gpu.types.GPUFrameBuffer
@@ -70,7 +70,7 @@ class _Sum:
 
 
 class Presenter:
-    """Draws into one viewport."""
+    """Draws into one viewport. To be given up where Blender's graphics context is active, and before Blender ends."""
 
     def __init__(self) -> None:
         self._samples: list[_Sample] = []
@@ -93,10 +93,6 @@ class Presenter:
             self._show(place)
         finally:
             before.restore()
-
-    def release(self) -> None:
-        """Give everything on the graphics processor back, where Blender's context is active: before Blender ends, too."""
-        self.__init__()  # type: ignore[misc]
 
     def _take(self, pictures: Sequence[Picture]) -> None:
         """Upload what is new; samples of another view are dropped."""

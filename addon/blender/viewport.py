@@ -118,9 +118,12 @@ class ViewportDrawing:
         started = time.monotonic()
         context = bpy.context
         self._release_dropped()
-        self._legends.pop(context.region.as_pointer(), None)
+        key = context.region.as_pointer()
+        self._legends.pop(key, None)
         if CHANGES.may_have_sources and context.scene.meniscus.use_viewport:
-            self._guarded(lambda: self._draw_fluid(context, started))
+            self._guarded(lambda: self._draw_fluid(context, key, started))
+        else:
+            self._show_nothing(key)
 
     def _draw_legend(self) -> None:
         """Blender's draw handler for what lies over the picture."""
@@ -149,14 +152,16 @@ class ViewportDrawing:
         self._paused_at = CHANGES.now
         STATUS.report(problem, details)
 
-    def _draw_fluid(self, context: bpy.types.Context, started: float) -> None:
+    def _draw_fluid(self, context: bpy.types.Context, key: int, started: float) -> None:
         look = read_look(context.scene)
         balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
         if balls is None:
+            self._show_nothing(key)
             return
-        viewport = self._viewport(context.region.as_pointer())
+        viewport = self._viewport(key)
         seen = viewport.look_at(balls)
         if seen is None:
+            viewport.drawn = viewport.live.revision
             return
         view = _view(context.scene, balls, seen, look)
         if view.backend != "cpu":
@@ -165,6 +170,11 @@ class ViewportDrawing:
         viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
         self._present(viewport, look, seen, context)
         self._report(viewport, balls)
+
+    def _show_nothing(self, key: int) -> None:
+        if key in self._viewports:
+            self._drop(key)
+        STATUS.clear()
 
     def _viewport(self, key: int) -> _Viewport:
         if key not in self._viewports:
@@ -220,8 +230,7 @@ class ViewportDrawing:
 
     def _release_dropped(self) -> None:
         """Textures are released where Blender's graphics context is surely active: in a handler."""
-        while self._dropped:
-            self._dropped.pop().presenter.release()
+        self._dropped.clear()
 
 
 def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:

@@ -4,7 +4,7 @@ import addon_utils
 import bpy
 import pytest
 from blender_fixtures import EXTENSION
-from event_loop import turns
+from event_loop import turns, wait_until
 from fluid_scenes import add_points
 from mathutils import Euler
 from recorder import recording
@@ -100,3 +100,19 @@ def test_what_the_user_can_mend_is_said_and_mended(fluid, drop):
     settings.radius_attribute = "radius"
     turns(3)
     fluid.check_presence("mended", drop)
+
+
+def test_a_viewport_that_looks_away_rests(fluid, drop):
+    look(drop.view, Euler((0, 0, 0)).to_quaternion(), 0.1, location=(0, 0, -50))
+    fluid.check_absence("looked_away", drop)
+    drawing = fluid.module("viewport")._drawing
+    wait_until(lambda: not bpy.app.timers.is_registered(drawing._timer), "the timer to end")
+
+
+def test_a_problem_ends_with_what_caused_it(fluid, drop):
+    item = bpy.data.objects["Drop"]
+    item.meniscus.radius_mode, item.meniscus.radius_attribute = "ATTRIBUTE", "nowhere"
+    wait_until(lambda: "nowhere" in fluid.status.problem, "the problem")
+    item.meniscus.use_fluid = False
+    wait_until(lambda: not fluid.status.problem, "its end")
+    assert fluid.lives() == []
