@@ -11,6 +11,7 @@ _SUBMODULES = (
     "preferences",
     "version_update",
     "operators",
+    "engine",
     "panels",
     "changes",
     "command_line",

@@ -11,6 +11,7 @@ from bl_ui.utils import PresetPanel
 
 from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
+from .engine import ENGINE
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
 from .texture_sharing import SHARING
@@ -261,6 +262,42 @@ class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
         _draw_look(self.layout, context.scene.meniscus)
 
 
+class MENISCUS_PT_sampling(_PropertiesPanel, bpy.types.Panel):
+    """Antialiasing of the render engine."""
+
+    bl_label = "Sampling"
+    bl_context = "render"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _split(self.layout).prop(context.scene.meniscus, "render_samples", text="Render")
+
+
+class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
+    """What the render engine gives beside Combined."""
+
+    bl_label = "Passes"
+    bl_context = "view_layer"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, view_layer = _split(self.layout), context.view_layer
+        layout.use_property_decorate = False
+        column = layout.column(heading="Data")
+        for name, label in (("use_pass_z", "Depth"), ("use_pass_normal", "Normal"), ("use_pass_position", "Position")):
+            column.prop(view_layer, name, text=label)
+        for name in ("use_pass_color", "use_pass_velocity", "use_pass_ball_id"):
+            column.prop(view_layer.meniscus, name)
+
+
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     """Names to the left, values to the right, with dots to animate them."""
     layout.use_property_split = True
@@ -377,6 +414,8 @@ _CLASSES = (
     MENISCUS_PT_particles,
     MENISCUS_PT_data,
     MENISCUS_PT_scene,
+    MENISCUS_PT_sampling,
+    MENISCUS_PT_passes,
 )
 
 

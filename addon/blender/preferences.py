@@ -61,6 +61,11 @@ def backend_of(scene: bpy.types.Scene) -> str:
     return scene.meniscus.backend if scene.meniscus.backend != "auto" else preferences().backend
 
 
+def threads_of(scene: bpy.types.Scene) -> int:
+    """How many threads a render may use by the scene's performance settings, else the user's; 0 for one a core."""
+    return int(scene.render.threads) if scene.render.threads_mode == "FIXED" else int(preferences().threads)
+
+
 def register() -> None:
     """Show the settings in the preferences."""
     bpy.utils.register_class(MENISCUS_AP_preferences)

@@ -19,6 +19,7 @@ from bpy.props import (
 from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.passes import PASSES
 from ..render.registry import method_infos
 from .changes import note_display, note_source
 
@@ -179,6 +180,14 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=0,
         options={"HIDDEN"},
     )
+    render_samples: IntProperty(
+        name="Render Samples",
+        description="Antialiasing of renders: how many samples a pixel of Combined gets; data passes have one",
+        default=16,
+        min=1,
+        max=1024,
+        soft_max=64,
+    )
     kernel: EnumProperty(
         name="Kernel",
         description="How the density of a ball falls from its centre to its influence radius",
@@ -331,7 +340,19 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
 
 
-_OWNERS = ((bpy.types.Object, MENISCUS_PG_object), (bpy.types.Scene, MENISCUS_PG_scene))
+class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
+    """The passes that Blender's own view layers have no switch for."""
+
+    use_pass_color: BoolProperty(name="Color", description=PASSES["color"].description)
+    use_pass_velocity: BoolProperty(name="Velocity", description=PASSES["velocity"].description)
+    use_pass_ball_id: BoolProperty(name="Ball ID", description=PASSES["ball_id"].description)
+
+
+_OWNERS = (
+    (bpy.types.Object, MENISCUS_PG_object),
+    (bpy.types.Scene, MENISCUS_PG_scene),
+    (bpy.types.ViewLayer, MENISCUS_PG_view_layer),
+)
 
 
 def register() -> None:

@@ -18,7 +18,7 @@ from ..output.frame_path import frame_path
 from ..output.whole_file import prepare_place
 from ..render.method import timed
 from ..render.renderer import render
-from .preferences import preferences
+from .preferences import threads_of
 from .preview import write_png
 from .read_camera import read_camera
 from .read_scene import read_balls, read_field, read_look
@@ -178,17 +178,12 @@ def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bo
         passes=passes,
         look=read_look(job.scene),
         is_cancelled=is_cancelled,
-        threads=_threads(job.scene),
+        threads=threads_of(job.scene),
     )
     image.info.milliseconds = {**milliseconds, **image.info.milliseconds}
     report.info = image.info
     report.left_out = balls.dropped_text
     return image
-
-
-def _threads(scene: bpy.types.Scene) -> int:
-    """How many threads the scene's performance settings allow, else the user, 0 for one a core."""
-    return int(scene.render.threads) if scene.render.threads_mode == "FIXED" else preferences().threads
 
 
 def _write_preview(image: ImageBuffers, report: FrameReport) -> None:

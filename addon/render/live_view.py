@@ -25,6 +25,7 @@ from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
 from .renderer import render_to_show
+from .samples import sample_offset
 from .thickness import thickness_image
 
 SETTLE_SECONDS = 0.06
@@ -214,7 +215,7 @@ class LiveView:
         camera = self._view.camera
         if self._stage() == 0:
             return camera.resized(*self._pace.size(camera.width, camera.height, 1.0 / self._view.frame_rate))
-        return camera.shifted(*_offset(len(self._pictures) if self._stage() != 1 else 0))
+        return camera.shifted(*sample_offset(len(self._pictures) if self._stage() != 1 else 0))
 
     def _accept(self, picture: Picture, seconds: float) -> None:
         camera = picture.image.camera
@@ -335,21 +336,3 @@ def _picture(image: ImageBuffers | DeviceImage, view: View) -> Picture:
     if view.uses_thickness:
         thickness = thickness_image(view.balls, image.camera, view.field)
     return Picture(image, view, importance, thickness)
-
-
-def _offset(sample: int) -> tuple[float, float]:
-    """Where a sample lies in its pixel, -0.5 to 0.5 from the centre; sample 0 at the centre.
-
-    Halton's sequence: any first samples are spread evenly, and their mean is nearer to the centre than one sample counts.
-    """
-    return (_mirrored(sample, 2) + 0.5) % 1.0 - 0.5, (_mirrored(sample, 3) + 0.5) % 1.0 - 0.5
-
-
-def _mirrored(number: int, base: int) -> float:
-    """The digits of a number mirrored at the point (van der Corput)."""
-    value, unit = 0.0, 1.0
-    while number:
-        unit /= base
-        number, digit = divmod(number, base)
-        value += digit * unit
-    return value

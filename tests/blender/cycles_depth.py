@@ -1,20 +1,9 @@
 """Depth passes by Cycles, to check cameras against: spheres that are exact, seen through the centres of the pixels."""
 
 import os
-import subprocess
-import sys
 
 import bpy
-import numpy as np
-
-_READ_DEPTH = """
-import sys
-import numpy
-import OpenEXR
-with OpenEXR.File(sys.argv[1], separate_channels=True) as file:
-    channels = {name: channel for part in file.parts for name, channel in part.channels.items()}
-    numpy.save(sys.argv[2], channels["ViewLayer.Depth.Z"].pixels)
-"""
+from exr_files import exr_channels
 
 
 def add_spheres(scene, centres, radius):
@@ -29,13 +18,10 @@ def add_spheres(scene, centres, radius):
 def cycles_depth(scene, folder):
     """(height, width) float32 Depth pass of the scene's camera, row 0 at the bottom."""
     _set_up_cycles(scene)
-    exr, array = os.path.join(folder, "depth.exr"), os.path.join(folder, "depth.npy")
+    exr = os.path.join(folder, "depth.exr")
     scene.render.filepath = exr
     bpy.ops.render.render(write_still=True)
-    # In a process of its own, because some programs bring an OpenEXR that does not get along with Python's.
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    subprocess.run([sys.executable, "-c", _READ_DEPTH, exr, array], check=True, env=environment)
-    return np.load(array)[::-1]
+    return exr_channels(exr)["ViewLayer.Depth.Z"]
 
 
 def _set_up_cycles(scene):

@@ -42,6 +42,14 @@ def test_panels_draw(drawn_panels, emitter, properties_editor, tab, panel, mode)
     wait_until(lambda: panel in drawn_panels, f"the panel {panel}")
 
 
+def test_panels_of_the_engine_draw(drawn_panels, emitter, properties_editor):
+    bpy.context.scene.render.engine = "MENISCUS"
+    for tab, panel in (("RENDER", "MENISCUS_PT_sampling"), ("VIEW_LAYER", "MENISCUS_PT_passes")):
+        properties_editor.spaces.active.context = tab
+        properties_editor.tag_redraw()
+        wait_until(lambda panel=panel: panel in drawn_panels, f"the panel {panel}")
+
+
 def test_rendering_leaves_the_window_as_it_was(meniscus, emitter):
     shown = viewport()
     before = settled(shown)

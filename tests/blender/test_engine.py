@@ -1,0 +1,128 @@
+"""The render engine: what F12 gives is what the package renders."""
+
+import importlib
+
+import bpy
+import numpy as np
+import pytest
+from exr_files import exr_channels
+from fluid_scenes import add_points, read_balls
+
+SIZE = (48, 36)
+
+
+@pytest.fixture
+def scene(empty_scene):
+    """A scene with a few balls before a camera, rendered by Meniscus, without view transform."""
+    add_points(empty_scene.collection, points=[(0, 0, 0), (0.6, 0, 0.2), (-0.3, 0.4, 0)], radius=1.0)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0, -6, 0), (np.pi / 2, 0, 0)
+    empty_scene.collection.objects.link(camera)
+    empty_scene.camera = camera
+    render = empty_scene.render
+    render.engine = "MENISCUS"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = *SIZE, 100
+    empty_scene.meniscus.render_samples = 4
+    for name in ("use_pass_z", "use_pass_normal", "use_pass_position"):
+        setattr(bpy.context.view_layer, name, True)
+    for name in ("use_pass_color", "use_pass_velocity", "use_pass_ball_id"):
+        setattr(bpy.context.view_layer.meniscus, name, True)
+    return empty_scene
+
+
+@pytest.fixture
+def rendered(scene, tmp_path):
+    """Renders as F12 does, and reads the passes back from the multilayer file that Blender writes; by name of the pass."""
+
+    def render():
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):  # since 5.0
+            settings.media_type = "MULTI_LAYER_IMAGE"
+        if hasattr(settings, "use_exr_interleave"):  # else a part for each pass
+            settings.use_exr_interleave = True
+        settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+        scene.render.filepath = str(tmp_path / "frame.exr")
+        assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+        channels = exr_channels(scene.render.filepath)
+        return {name.split(".", 1)[1]: pixels for name, pixels in channels.items()}
+
+    return render
+
+
+def expected(meniscus, scene, **changes):
+    package = meniscus.__name__
+    read_camera = importlib.import_module(f"{package}.addon.blender.read_camera").read_camera
+    reader = importlib.import_module(f"{package}.addon.blender.read_scene")
+    camera = read_camera(bpy.context.evaluated_depsgraph_get())
+    passes = ("combined", "depth", "normal", "position", "color", "velocity", "ball_id")
+    return meniscus.render(
+        read_balls(meniscus), camera, reader.read_field(scene), passes=passes, look=reader.read_look(scene), **changes
+    )
+
+
+def test_passes_are_those_of_the_package(meniscus, scene, rendered):
+    passes, image = rendered(), expected(meniscus, scene)
+    for name, channels in (("Normal", "XYZ"), ("Position", "XYZ"), ("Color", "RGB"), ("Velocity", "XYZ")):
+        for index, channel in enumerate(channels):
+            np.testing.assert_allclose(passes[f"{name}.{channel}"], image[name.lower()][..., index], atol=1e-5)
+    np.testing.assert_allclose(passes["Depth.Z" if "Depth.Z" in passes else "Depth.V"], image["depth"], rtol=1e-6)
+    np.testing.assert_array_equal(passes["Ball ID.X"], image["ball_id"])
+    assert image.hit.mean() > 0.1
+
+
+def test_combined_is_antialiased_and_data_are_not(meniscus, scene, rendered):
+    passes, image = rendered(), expected(meniscus, scene)
+    alpha = passes["Combined.A"]
+    assert set(np.unique(image["combined"][..., 3])) == {0, 1}
+    assert len(np.unique(alpha)) == scene.meniscus.render_samples + 1
+    inside = np.all([np.roll(image.hit, (y, x), (0, 1)) for x in (-1, 0, 1) for y in (-1, 0, 1)], axis=0)
+    np.testing.assert_allclose(alpha[inside], 1)
+    scene.meniscus.render_samples = 1
+    once = rendered()
+    for index, channel in enumerate("RGBA"):
+        np.testing.assert_allclose(once[f"Combined.{channel}"], image["combined"][..., index], atol=1e-5)
+
+
+@pytest.mark.parametrize("crop", [False, True])
+def test_border(meniscus, scene, rendered, crop):
+    whole = rendered()
+    scene.render.use_border, scene.render.use_crop_to_border = True, crop
+    scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+    scene.render.border_min_y, scene.render.border_max_y = 0.0, 0.5
+    part = rendered()["Normal.Y"]
+    inside = np.s_[0:18, 12:36]
+    np.testing.assert_allclose(part if crop else part[inside], whole["Normal.Y"][inside], atol=1e-5)
+    if not crop:
+        assert not part[18:].any()
+
+
+def test_without_a_camera_one_sentence_says_so(scene):
+    scene.camera = None
+    with pytest.raises(RuntimeError, match="camera"):
+        bpy.ops.render.render()
+
+
+def test_an_unexpected_error_reaches_the_user(meniscus, scene, monkeypatch):
+    engine = importlib.import_module(f"{meniscus.__name__}.addon.blender.engine")
+
+    def fail(*_arguments, **_settings):
+        raise ValueError("nobody expected this")
+
+    monkeypatch.setattr(engine, "read_balls", fail)
+    with pytest.raises(RuntimeError, match="nobody expected this"):
+        bpy.ops.render.render()
+
+
+def test_an_animation_renders_each_frame_anew(scene, tmp_path):
+    item = bpy.data.objects["Points"]
+    item.location.x = -1
+    item.keyframe_insert("location", frame=1)
+    item.location.x = 1
+    item.keyframe_insert("location", frame=3)
+    scene.frame_start, scene.frame_end = 1, 3
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode = "PNG", "RGBA"
+    scene.render.filepath = str(tmp_path / "f_")
+    bpy.ops.render.render(animation=True)
+    contents = {path.read_bytes() for path in tmp_path.glob("f_*.png")}
+    assert len(contents) == 3
