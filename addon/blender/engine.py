@@ -107,7 +107,9 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         """Hand an image to Blender, which wants that of the border alone."""
         region = image.camera.active_region
         for image_pass in passes[1:]:
-            self.add_pass(image_pass.blender_name, len(image_pass.channels), image_pass.channels, layer=depsgraph.view_layer.name)
+            self.add_pass(
+                image_pass.blender_name, len(image_pass.channels), image_pass.channels, layer=depsgraph.view_layer.name
+            )
         result = self.begin_result(0, 0, region.width, region.height, layer=depsgraph.view_layer.name)
         layer = result.layers[0]
         for image_pass in passes:
