@@ -14,7 +14,7 @@ from fluid_scenes import add_points
 from gl_state import StateReader, changes
 from gpu_extras.batch import batch_for_shader
 from pictures import check_same, screen_picture
-from viewports import Viewport, settled
+from viewports import Viewport, settled, shrunk
 
 REDRAWS = 1000
 MOST_GROWTH = 8.0
@@ -147,20 +147,6 @@ def growth_of_orbiting(shown, count):
         counts.append(len(drawn))
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
     return (np.diff(sizes) / np.diff(counts)).tolist()
-
-
-def shrunk(shown):
-    """A small part of a viewport; the rest of the window shows what is drawn quickly, and seldom."""
-    for direction in ("VERTICAL", "HORIZONTAL"):
-        with shown.override():
-            bpy.ops.screen.area_split(direction=direction, factor=0.3)
-        turns(3)
-    kept = shown.area
-    for area in shown.window.screen.areas:
-        if area != kept and area.height > 100:
-            area.type = "CONSOLE"
-    turns(3)
-    return Viewport()
 
 
 def orbit(shown, count):

@@ -101,6 +101,20 @@ def look(
     view.update()
 
 
+def shrunk(shown: Viewport) -> Viewport:
+    """A small part of a viewport; the rest of the window shows what is drawn quickly, and seldom."""
+    for direction in ("VERTICAL", "HORIZONTAL"):
+        with shown.override():
+            bpy.ops.screen.area_split(direction=direction, factor=0.3)
+        turns(3)
+    kept = shown.area
+    for area in shown.window.screen.areas:
+        if area != kept and area.height > 100:
+            area.type = "CONSOLE"
+    turns(3)
+    return Viewport()
+
+
 def region_picture(window: bpy.types.Window, region: bpy.types.Region) -> Picture:
     """What the screen shows of a region of a window now."""
     x, y = window.x + region.x, window.y + region.y
