@@ -29,7 +29,7 @@ def test_the_scene_comes_before_the_user(preferences):
 
 def test_the_command_line_asks_its_arguments_then_the_scene_then_the_user(preferences, meniscus, tmp_path):
     package = f"{meniscus.__name__}.addon.blender"
-    command_line, render_frames = (importlib.import_module(f"{package}.{name}") for name in ("command_line", "render_frames"))
+    command_line = importlib.import_module(f"{package}.command_line")
     arguments = ["render", "--frames", "1", "--output", str(tmp_path / "fluid.exr")]
     scene, chosen = bpy.context.scene, preferences.preferences()
 
@@ -39,9 +39,9 @@ def test_the_command_line_asks_its_arguments_then_the_scene_then_the_user(prefer
     chosen.backend, chosen.threads = "cpu", 3
     try:
         assert (job().backend, job("--backend", "gpu").backend) == ("cpu", "gpu")
-        assert render_frames._threads(scene) == 3
+        assert preferences.threads_of(scene) == 3
         scene.render.threads_mode, scene.render.threads = "FIXED", 2
-        assert render_frames._threads(scene) == 2
+        assert preferences.threads_of(scene) == 2
         scene.meniscus.backend = "gpu"
         assert job().backend == "gpu"
     finally:

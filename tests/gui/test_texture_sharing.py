@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 import pytest
 from gpu_extras.batch import batch_for_shader
-from viewports import Viewport, shrunk
+from viewports import Viewport
 
 TEXTURE_BINDING_2D = 0x8069
 # Framebuffers, viewport, scissor, program, vertex array, buffers, units, depth, culling, blending, stencil, polygons, pixels.
@@ -195,7 +195,6 @@ def test_the_picture_is_the_one_that_is_read_back_and_meshes_hide_and_are_hidden
 
 
 def test_sharing_leaves_nothing_behind(drawing):
-    shrunk(Viewport())
     redraw(10)
     assert set(drawing.kinds) == {"DeviceImage"}
     before = resident_megabytes()

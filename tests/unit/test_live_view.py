@@ -11,8 +11,9 @@ import pytest
 import meniscus
 from meniscus.addon.fluid.errors import CancelledError, DeviceError
 from meniscus.addon.fluid.image import ImageBuffers, RenderInfo
-from meniscus.addon.render.live_view import LiveRenderer, View, _offset
+from meniscus.addon.render.live_view import LiveRenderer, View
 from meniscus.addon.render.pace import Pace
+from meniscus.addon.render.samples import sample_offset
 
 CAMERA = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=1000, height=600)
 BALLS = meniscus.Balls([[0, 0, 0], [0.5, 0, 0]], 0.9)
@@ -264,12 +265,12 @@ def test_real_pictures_are_those_of_the_renderer():
 
 def test_samples_are_spread_evenly_over_the_pixel():
     for count in (4, 8, 16, 32):
-        offsets = np.array([_offset(sample) for sample in range(count)])
+        offsets = np.array([sample_offset(sample) for sample in range(count)])
         assert np.all(np.abs(offsets) <= 0.5)
         assert np.all(np.abs(offsets.mean(axis=0)) < 1 / count), "by less than one sample can move it"
         gaps = np.linalg.norm(offsets[:, None] - offsets[None], axis=2) + 9 * np.eye(count)
         assert gaps.min() > 0.4 / np.sqrt(count)
-    assert _offset(0) == (0, 0)
+    assert sample_offset(0) == (0, 0)
 
 
 class TestPace:
