@@ -78,7 +78,7 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         if balls.dropped_text:
             self.report({"WARNING"}, balls.dropped_text)
         passes = wanted_passes(depsgraph.view_layer)
-        scene = depsgraph.scene
+        scene = depsgraph.scene_eval  # animated settings reach only this one
         shot = partial(
             render,
             balls,
@@ -133,6 +133,6 @@ def unregister() -> None:
 
 
 def _shared_panels() -> list[type[bpy.types.Panel]]:
-    """Blender's panels that every engine shares: those for Blender Render that EEVEE takes from it."""
+    """Blender's panels that hold for any engine; they name the engine that Blender once had."""
     panels = bpy.types.Panel.__subclasses__()
     return [panel for panel in panels if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())]

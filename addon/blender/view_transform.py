@@ -27,6 +27,8 @@ _PLAIN: Key = ("sRGB", "Standard", "None", None, None)
 """What needs no table: display, view transform, look, white balance, and curves with the exposure."""
 
 _MOST_TRANSFORMS = 32
+_MOST_TABLES = 16
+"""Animated curves ask for one at each frame, of 3 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +88,16 @@ class ViewTransforms:
         """Make the tables that were missing. Not while Blender draws: it makes data for it, and removes them."""
         while self._missing:
             key, scene_name = self._missing.popitem()
+            if len(self._tables) >= _MOST_TABLES:
+                self._tables = {_PLAIN: None}
+                self._transforms.clear()
             if scene_name in bpy.data.scenes:
                 self._tables[key] = self._table(bpy.data.scenes[scene_name], key)
 
     def _table(self, scene: bpy.types.Scene, key: Key) -> FloatArray | None:
         try:
             return _converted(_table_colors(), scene, key)
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, TypeError) as error:
             self.problem = f"The view transform '{key[1]}' is not applied to the fluid ({error}): Standard is used instead"
             return None
 

@@ -113,6 +113,20 @@ def test_an_unexpected_error_reaches_the_user(meniscus, scene, monkeypatch):
         bpy.ops.render.render()
 
 
+def test_animated_settings_count(scene, rendered):
+    settings = scene.meniscus
+    settings.style, settings.color = "flat", (1, 0, 0)
+    settings.keyframe_insert("color", frame=1)
+    settings.color = (0, 0, 1)
+    settings.keyframe_insert("color", frame=11)
+    scene.frame_set(11)
+    settings.color = (0, 1, 0)  # not what the animation says
+    passes = rendered()
+    inside = passes["Combined.A"] == 1
+    assert inside.any()
+    assert (passes["Combined.B"][inside].min(), passes["Combined.G"][inside].max()) == (1, 0)
+
+
 def test_an_animation_renders_each_frame_anew(scene, tmp_path):
     item = bpy.data.objects["Points"]
     item.location.x = -1
