@@ -108,7 +108,13 @@ class FluidViews:
             picture = shown.picture().astype(int)
             return np.abs(picture[is_mesh] - picture[FRAME, FRAME]).max() > 2 * PRESENCE_TOLERANCE
 
-        wait_until(are_drawn, "the cube in EEVEE", 3 * DEADLINE)
+        # Without the fluid, which would show where the meshes are not yet.
+        settings = bpy.context.scene.meniscus
+        settings.use_viewport = False
+        try:
+            wait_until(are_drawn, "the cube in EEVEE", 3 * DEADLINE)
+        finally:
+            settings.use_viewport = True
 
     def check_absence(self, name: str, shown: Viewport) -> None:
         """No pixel shows fluid."""
