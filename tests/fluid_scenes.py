@@ -11,7 +11,7 @@ GRID_POINTS = np.array([(0, 0, 0), (1, 0, 0), (0, 2, 0), (0, 0, 3)], np.float32)
 def read_balls(meniscus, **options):
     """The balls of the current scene, through the dependency graph that the viewport uses."""
     reader = importlib.import_module(meniscus.__name__ + ".addon.blender.read_scene")
-    return reader.read_balls(bpy.context.evaluated_depsgraph_get(), **options)
+    return reader.read_fluid(bpy.context.evaluated_depsgraph_get(), **options).balls
 
 
 def input_error(meniscus):

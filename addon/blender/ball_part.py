@@ -28,6 +28,8 @@ class BallPart:
         (N, 3) float32, world space, Blender units a second; None where unknown.
     ids
         (N,) int32; None where unknown.
+    source
+        Index of the object.
     """
 
     positions: FloatArray
@@ -36,6 +38,7 @@ class BallPart:
     colors: FloatArray | None
     velocities: FloatArray | None
     ids: npt.NDArray[np.int32] | None
+    source: int = 0
 
     def __len__(self) -> int:
         return len(self.positions)

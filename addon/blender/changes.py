@@ -101,6 +101,7 @@ _IDS_WITH_BALLS = (
     bpy.types.PointCloud,
     bpy.types.ParticleSettings,
     bpy.types.GeometryNodeTree,
+    bpy.types.Material,
 )
 _HANDLERS = {
     "frame_change_post": _note_frame,

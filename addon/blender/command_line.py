@@ -19,8 +19,10 @@ from ..fluid.errors import InputError, MeniscusError
 from ..output.frame_path import numbered_pattern
 from ..output.whole_file import whole_file
 from .command_line_arguments import parse_arguments
-from .preferences import backend_of
+from .preferences import backend_of, threads_of
 from .render_frames import FrameReport, RenderJob, render_frames
+from .render_scene import RenderSettings
+from .view_layer_passes import cryptomatte_levels
 
 _commands: list[Any] = []
 """What Blender gave for the registered command, to unregister it with."""
@@ -85,16 +87,23 @@ def _job(options: argparse.Namespace) -> RenderJob:
     frames = options.frames or tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
     if not frames:
         raise InputError(f"The scene's frame range {scene.frame_start} to {scene.frame_end} is empty; use --frames")
+    view_layer = _view_layer(scene, options.view_layer)
     return RenderJob(
         scene=scene,
-        view_layer=_view_layer(scene, options.view_layer),
-        camera=_camera(scene, options.camera),
+        view_layer=view_layer,
+        settings=RenderSettings(
+            passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
+            cryptomatte_levels=cryptomatte_levels(view_layer),
+            samples=options.samples or scene.meniscus.render_samples,
+            method=options.method or scene.meniscus.method,
+            backend=options.backend or backend_of(scene),
+            threads=threads_of(scene),
+            camera=_camera(scene, options.camera),
+            resolution=options.resolution,
+        ),
         frames=frames,
         output=_output(options.output, len(frames)),
-        resolution=options.resolution,
         passes=options.passes,
-        method=options.method or scene.meniscus.method,
-        backend=options.backend or backend_of(scene),
         compression=options.compression,
         use_preview=options.preview,
     )

@@ -79,6 +79,9 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
         metavar="LIST",
         help=f"of {', '.join(PASSES)}, with commas between; depth,normal if left out",
     )
+    render.add_argument(
+        "--samples", type=sample_count, metavar="N", help="of Combined and Alpha, for antialiasing; the scene's if left out"
+    )
     render.add_argument("--method", metavar="NAME", help="how the surface is found; the scene's choice if left out")
     render.add_argument("--backend", metavar="NAME", help="auto, gpu or cpu; the scene's choice if left out")
     render.add_argument("--compression", choices=COMPRESSIONS, default="ZIP", help="all lossless; ZIP if left out")
@@ -115,6 +118,13 @@ def resolution(text: str) -> tuple[int, int]:
     if not all(1 <= pixels <= _LARGEST_SIDE for pixels in size):
         raise argparse.ArgumentTypeError(f"'{text}' is no image size; write WIDTHxHEIGHT, each from 1 to {_LARGEST_SIDE}")
     return size
+
+
+def sample_count(text: str) -> int:
+    """A number of samples, 1 or more."""
+    if not re.fullmatch(r"\d+", text) or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of samples; write 1 or more")
+    return int(text)
 
 
 def pass_names(text: str) -> tuple[str, ...]:

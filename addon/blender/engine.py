@@ -3,44 +3,37 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
-from functools import partial
 
 import bpy
 import numpy as np
-import numpy.typing as npt
 
-from ..fluid.camera import Camera
+from ..fluid.cryptomatte import LAYER
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
-from ..fluid.passes import PASSES, Pass
-from ..render.renderer import render
-from ..render.samples import sample_offset
+from ..fluid.passes import Pass
 from .preferences import backend_of, threads_of
-from .read_camera import read_camera
-from .read_scene import read_balls, read_field, read_look
+from .render_scene import RenderControl, RenderSettings, render_scene
+from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 ENGINE = "MENISCUS"
 
-FloatArray = npt.NDArray[np.float32]
-
-# The switches of Blender's view layers that a pass has.
-_BLENDER_SWITCHES = {"depth": "use_pass_z", "normal": "use_pass_normal", "position": "use_pass_position"}
+_MATTE_CHANNELS = "rgba"
+"""As Cycles names them, so that they are not taken for colours."""
 
 
-def wanted_passes(view_layer: bpy.types.ViewLayer) -> list[Pass]:
-    """The passes that a view layer asks for, Combined first."""
-    return [image_pass for name, image_pass in PASSES.items() if name == "combined" or _is_wanted(view_layer, name)]
+def _name_of(image_pass: Pass) -> str:
+    """Blender's name of a pass; one of them has changed."""
+    if image_pass.name == "object_index" and bpy.app.version < (5, 0):
+        return "IndexOB"
+    return image_pass.blender_name
 
 
-def _is_wanted(view_layer: bpy.types.ViewLayer, name: str) -> bool:
-    if name in _BLENDER_SWITCHES:
-        return bool(getattr(view_layer, _BLENDER_SWITCHES[name]))
-    return bool(getattr(view_layer.meniscus, f"use_pass_{name}"))
+def _matte_names(view_layer: bpy.types.ViewLayer) -> list[str]:
+    return [f"{LAYER}{index:02}" for index in range((cryptomatte_levels(view_layer) + 1) // 2)]
 
 
 class MENISCUS_RE_engine(bpy.types.RenderEngine):
-    """Renders the fluid alone; what is around it comes from another engine and is composited by depth."""
+    """Renders the fluid in the light of the scene, with what hides it."""
 
     bl_idname = ENGINE
     bl_label = "Meniscus"
@@ -51,9 +44,11 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         """Tell the compositor which images there will be."""
         for image_pass in wanted_passes(renderlayer):
-            kind = "COLOR" if image_pass.is_color else "VECTOR" if len(image_pass.channels) == 3 else "VALUE"
             count = len(image_pass.channels)
-            self.register_pass(scene, renderlayer, image_pass.blender_name, count, image_pass.channels, kind)
+            kind = "COLOR" if image_pass.is_color else "VALUE" if count == 1 else "VECTOR"
+            self.register_pass(scene, renderlayer, _name_of(image_pass), count, image_pass.channels, kind)
+        for name in _matte_names(renderlayer):
+            self.register_pass(scene, renderlayer, name, 4, _MATTE_CHANNELS, "COLOR")
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Render a view layer. Nothing may leave it: Blender would stop without a word to the user."""
@@ -73,48 +68,47 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         self.report({"ERROR"}, sentence)
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self.update_stats("", "Reading the scene")
-        camera, balls = read_camera(depsgraph), read_balls(depsgraph)
-        if balls.dropped_text:
-            self.report({"WARNING"}, balls.dropped_text)
-        passes = wanted_passes(depsgraph.view_layer)
-        scene = depsgraph.scene_eval  # animated settings reach only this one
-        shot = partial(
-            render,
-            balls,
-            field=read_field(scene),
+        scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer
+        passes = wanted_passes(view_layer)
+        settings = RenderSettings(
+            passes=tuple(image_pass.name for image_pass in passes),
+            cryptomatte_levels=cryptomatte_levels(view_layer),
+            samples=scene.meniscus.render_samples,
             method=scene.meniscus.method,
             backend=backend_of(scene),
-            look=read_look(scene),
-            is_cancelled=self.test_break,
             threads=threads_of(scene),
         )
-        image = shot(camera, passes=[image_pass.name for image_pass in passes])
-        image.passes["combined"] = self._mean(image["combined"], shot, camera, scene.meniscus.render_samples)
+        image = render_scene(depsgraph, settings, RenderControl(self._set_frame, self.test_break, self._show_progress))
+        if image.info.dropped_text:
+            self.report({"WARNING"}, image.info.dropped_text)
         self._give(depsgraph, image, passes)
 
-    def _mean(self, first: FloatArray, shot: Callable[..., ImageBuffers], camera: Camera, samples: int) -> FloatArray:
-        """(height, width, 4): Combined with all samples, of which the first, through the centres of pixels, is there."""
-        total = first.copy()
-        for number in range(1, samples):
-            self.update_progress(number / samples)
-            self.update_stats("", f"Sample {number + 1} of {samples}")
-            total += shot(camera.shifted(*sample_offset(number)), passes=("combined",))["combined"]
-        self.update_progress(1.0)
-        return total / samples
+    def _set_frame(self, frame: int, subframe: float) -> None:
+        self.frame_set(frame, subframe=subframe)
+
+    def _show_progress(self, share: float, text: str) -> None:
+        self.update_progress(share)
+        self.update_stats("", text)
 
     def _give(self, depsgraph: bpy.types.Depsgraph, image: ImageBuffers, passes: list[Pass]) -> None:
         """Hand an image to Blender, which wants that of the border alone."""
-        region = image.camera.active_region
+        region, view_layer = image.camera.active_region, depsgraph.view_layer
         for image_pass in passes[1:]:
-            self.add_pass(
-                image_pass.blender_name, len(image_pass.channels), image_pass.channels, layer=depsgraph.view_layer.name
-            )
-        result = self.begin_result(0, 0, region.width, region.height, layer=depsgraph.view_layer.name)
+            channels = image_pass.channels
+            self.add_pass(_name_of(image_pass), len(channels), channels, layer=view_layer.name)
+        images = {_name_of(image_pass): image[image_pass.name] for image_pass in passes}
+        if image.cryptomatte is not None:
+            for name in image.cryptomatte.layers:
+                self.add_pass(name, 4, _MATTE_CHANNELS, layer=view_layer.name)
+            images |= image.cryptomatte.layers
+        result = self.begin_result(0, 0, region.width, region.height, layer=view_layer.name)
         layer = result.layers[0]
-        for image_pass in passes:
-            pixels = image[image_pass.name][region.y_min : region.y_max, region.x_min : region.x_max]
-            layer.passes[image_pass.blender_name].rect.foreach_set(np.ascontiguousarray(pixels).reshape(-1))
+        for name, pixels in images.items():
+            part = pixels[region.y_min : region.y_max, region.x_min : region.x_max]
+            layer.passes[name].rect.foreach_set(np.ascontiguousarray(part).reshape(-1))
+        if image.cryptomatte is not None:
+            for key, value in image.cryptomatte.metadata(view_layer.name).items():
+                result.stamp_data_add_field(key, value)
         self.end_result(result)
 
 

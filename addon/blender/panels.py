@@ -11,11 +11,13 @@ from bl_ui.utils import PresetPanel
 
 from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
+from ..fluid.passes import PASSES
 from .engine import ENGINE
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
 from .texture_sharing import SHARING
 from .version_update import CURRENT_VERSION
+from .view_layer_passes import BLENDER_SWITCHES
 from .viewport_status import STATUS
 
 _CLOSED: ClassVar = {"DEFAULT_CLOSED"}
@@ -277,6 +279,21 @@ class MENISCUS_PT_sampling(_PropertiesPanel, bpy.types.Panel):
         _split(self.layout).prop(context.scene.meniscus, "render_samples", text="Render")
 
 
+class MENISCUS_PT_render_look(_PropertiesPanel, bpy.types.Panel):
+    """How renders colour the fluid."""
+
+    bl_label = "Fluid"
+    bl_context = "render"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _split(self.layout).prop(context.scene.meniscus, "render_style", text="Look")
+
+
 class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
     """What the render engine gives beside Combined."""
 
@@ -292,10 +309,17 @@ class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
         layout, view_layer = _split(self.layout), context.view_layer
         layout.use_property_decorate = False
         column = layout.column(heading="Data")
-        for name, label in (("use_pass_z", "Depth"), ("use_pass_normal", "Normal"), ("use_pass_position", "Position")):
-            column.prop(view_layer, name, text=label)
-        for name in ("use_pass_color", "use_pass_velocity", "use_pass_ball_id"):
-            column.prop(view_layer.meniscus, name)
+        for image_pass in PASSES.values():
+            switch = BLENDER_SWITCHES.get(image_pass.name)
+            if switch is not None:
+                column.prop(view_layer, switch, text=image_pass.blender_name)
+            elif image_pass.name != "combined":
+                column.prop(view_layer.meniscus, f"use_pass_{image_pass.name}")
+        column = layout.column(heading="Cryptomatte")
+        column.prop(view_layer, "use_pass_cryptomatte_object", text="Object")
+        levels = column.column()
+        levels.active = view_layer.use_pass_cryptomatte_object
+        levels.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
@@ -415,6 +439,7 @@ _CLASSES = (
     MENISCUS_PT_data,
     MENISCUS_PT_scene,
     MENISCUS_PT_sampling,
+    MENISCUS_PT_render_look,
     MENISCUS_PT_passes,
 )
 

@@ -140,7 +140,7 @@ class Presenter:
     def _shade_textures(self, sample: _Sample, look: Look, transform: DisplayTransform) -> Textures:
         # Samplers that the look does not use need some texture all the same.
         depth = sample.textures["depth"]
-        values = [sample.textures[name] for name in LOOK_STYLES[look.style].passes if name in sample.textures]
+        values = [texture for name, texture in sample.textures.items() if name not in ("depth", "normal")]
         return {
             "depth_tx": depth,
             "normal_tx": sample.textures["normal"],

@@ -226,6 +226,12 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         default=Look().style,
         update=note_display,
     )
+    render_style: EnumProperty(
+        name="Render Look",
+        description="How the surface is coloured in renders",
+        items=stable_items((style.name, style.label, style.description) for style in LOOK_STYLES.values()),
+        default="material",
+    )
     color: FloatVectorProperty(
         name="Color",
         description="Surface colour of fluids that have no colour of their own",
@@ -343,8 +349,11 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
 class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
     """The passes that Blender's own view layers have no switch for."""
 
+    use_pass_alpha: BoolProperty(name="Alpha", description=PASSES["alpha"].description)
+    use_pass_facing: BoolProperty(name="Facing", description=PASSES["facing"].description)
     use_pass_color: BoolProperty(name="Color", description=PASSES["color"].description)
     use_pass_velocity: BoolProperty(name="Velocity", description=PASSES["velocity"].description)
+    use_pass_speed: BoolProperty(name="Speed", description=PASSES["speed"].description)
     use_pass_ball_id: BoolProperty(name="Ball ID", description=PASSES["ball_id"].description)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -12,14 +13,30 @@ import numpy.typing as npt
 from ..fluid.balls import Balls
 from ..fluid.errors import InputError
 from ..fluid.field import Field
+from ..fluid.lighting import FluidSource
 from ..fluid.look import Look
 from .ball_part import BallPart
+from .read_materials import read_source
 from .read_particles import has_particle_systems, read_particles
 from .read_points import read_points
 from .visible_sources import Source, settings_of, visible_sources
 
 
-def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space: bpy.types.SpaceView3D | None = None) -> Balls:
+@dataclass(frozen=True)
+class Fluid:
+    """All balls of a scene, and the objects that they come from by their index in :attr:`Balls.sources`."""
+
+    balls: Balls
+    sources: tuple[FluidSource, ...]
+
+
+def read_fluid(
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    viewport: bool = False,
+    space: bpy.types.SpaceView3D | None = None,
+    uses_materials: bool = False,
+) -> Fluid:
     """All balls of a scene at its current frame, in world space.
 
     Parameters
@@ -30,10 +47,12 @@ def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space:
         Whether to read what the viewport shows rather than what a render shows.
     space
         The viewport whose local view counts; None for none.
+    uses_materials
+        Whether balls without colours of their own get that of their material, not that of the scene.
 
     Returns
     -------
-    Balls
+    Fluid
         Of all sources together; none where the sources are hidden or have no particle at this frame. Ids are there where
         a single source has them, because those of several would clash.
 
@@ -45,9 +64,16 @@ def read_balls(depsgraph: bpy.types.Depsgraph, *, viewport: bool = False, space:
         One lacks what its settings ask for.
     """
     parts: list[BallPart] = []
+    objects: dict[str, FluidSource] = {}
     for source in visible_sources(depsgraph, viewport, space):
-        parts.extend(_parts_of(source, depsgraph, viewport))
-    return _joined([part for part in parts if len(part)], tuple(settings_of(depsgraph.scene_eval, depsgraph).color))
+        known = objects.setdefault(source.object.name_full, read_source(source.object))
+        index = list(objects).index(source.object.name_full)
+        parts += [
+            replace(part, source=index, colors=known.material.color if uses_materials and part.colors is None else part.colors)
+            for part in _parts_of(source, depsgraph, viewport)
+        ]
+    scene_color = tuple(settings_of(depsgraph.scene_eval, depsgraph).color)
+    return Fluid(_joined([part for part in parts if len(part)], scene_color), tuple(objects.values()))
 
 
 def read_field(scene: bpy.types.Scene) -> Field:
@@ -55,11 +81,11 @@ def read_field(scene: bpy.types.Scene) -> Field:
     return Field(kernel=scene.meniscus.kernel, isovalue=scene.meniscus.isovalue)
 
 
-def read_look(scene: bpy.types.Scene) -> Look:
-    """The colour and light that the scene's settings describe."""
+def read_look(scene: bpy.types.Scene, style: str) -> Look:
+    """The colour and light that the scene's settings describe, in one of the :data:`look.LOOK_STYLES`."""
     settings = scene.meniscus
     return Look(
-        style=settings.style,
+        style=style,
         color=tuple(settings.color),
         ambient=settings.ambient,
         roughness=settings.roughness,
@@ -94,6 +120,7 @@ def _joined(parts: Sequence[BallPart], scene_color: tuple[float, float, float]) 
         colors=_optional(parts, lambda part: part.colors, scene_color),
         velocities=_optional(parts, lambda part: part.velocities, (0.0, 0.0, 0.0)),
         ids=parts[0].ids if len(parts) == 1 else None,
+        sources=np.repeat([part.source for part in parts], [len(part) for part in parts]),
     )
 
 

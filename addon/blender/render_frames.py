@@ -17,11 +17,8 @@ from ..output.exr_process import ExrProcess
 from ..output.frame_path import frame_path
 from ..output.whole_file import prepare_place
 from ..render.method import timed
-from ..render.renderer import render
-from .preferences import threads_of
 from .preview import write_png
-from .read_camera import read_camera
-from .read_scene import read_balls, read_field, read_look
+from .render_scene import RenderControl, RenderSettings, render_scene
 
 
 @dataclass(frozen=True)
@@ -32,16 +29,14 @@ class RenderJob:
     ----------
     scene, view_layer
         What is seen; the view layer's name becomes part of the channel names.
-    camera
-        None for the scene's.
+    settings
+        How each frame is rendered; Combined is among its passes where there are previews.
     frames
         Frame numbers, in the order to render.
     output
         Absolute path with ``####`` for the frame number.
-    resolution
-        Width and height in pixels; None for the scene's.
-    passes, method, backend
-        See :func:`renderer.render`.
+    passes
+        Names of those that are written.
     compression
         See :data:`exr.COMPRESSIONS`.
     use_preview
@@ -50,13 +45,10 @@ class RenderJob:
 
     scene: bpy.types.Scene
     view_layer: bpy.types.ViewLayer
-    camera: bpy.types.Object | None
+    settings: RenderSettings
     frames: tuple[int, ...]
     output: str
-    resolution: tuple[int, int] | None
     passes: tuple[str, ...]
-    method: str
-    backend: str
     compression: str
     use_preview: bool
 
@@ -161,29 +153,19 @@ def _begin_frame(job: RenderJob, frame: int, writer: ExrProcess, is_cancelled: C
 
 def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bool]) -> ImageBuffers:
     milliseconds: dict[str, float] = {}
+    control = RenderControl(lambda frame, subframe: _set_frame(job, frame, subframe), is_cancelled)
     with timed(milliseconds, "scene"):
-        job.scene.frame_set(report.frame)
-        job.view_layer.update()
-        depsgraph = job.view_layer.depsgraph
-    with timed(milliseconds, "read"):
-        camera = read_camera(depsgraph, job.camera, job.resolution)
-        balls = read_balls(depsgraph)
-    passes = (*job.passes, "combined") if job.use_preview else job.passes
-    image = render(
-        balls,
-        camera,
-        read_field(job.scene),
-        method=job.method,
-        backend=job.backend,
-        passes=passes,
-        look=read_look(job.scene),
-        is_cancelled=is_cancelled,
-        threads=threads_of(job.scene),
-    )
+        _set_frame(job, report.frame, 0.0)
+    image = render_scene(job.view_layer.depsgraph, job.settings, control)
     image.info.milliseconds = {**milliseconds, **image.info.milliseconds}
     report.info = image.info
-    report.left_out = balls.dropped_text
+    report.left_out = image.info.dropped_text
     return image
+
+
+def _set_frame(job: RenderJob, frame: int, subframe: float) -> None:
+    job.scene.frame_set(frame, subframe=subframe)
+    job.view_layer.update()
 
 
 def _write_preview(image: ImageBuffers, report: FrameReport) -> None:

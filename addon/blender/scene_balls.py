@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ..fluid.balls import Balls
 from .changes import Changes
-from .read_scene import read_balls
+from .read_scene import Fluid, read_fluid
 from .visible_sources import NoSourceError
 
-_ARRAYS = ("positions", "radii", "weights", "colors", "velocities", "ids")
+_ARRAYS = ("positions", "radii", "weights", "colors", "velocities", "ids", "sources")
 
 Key = tuple[int, str, int]
 """Address of the scene, name of the view layer, and address of a viewport that shows its own choice of objects, else 0."""
@@ -20,10 +20,10 @@ Key = tuple[int, str, int]
 
 @dataclass
 class _Entry:
-    """What was read, when, and with which colour of the scene, which is that of balls without one of their own."""
+    """What was read, and when: with it the colours of balls that have none of their own."""
 
-    read_at: tuple[int, tuple[float, ...]]
-    balls: Balls | None
+    read_at: tuple[int, tuple[float, ...], bool]
+    fluid: Fluid | None
 
 
 class SceneBalls:
@@ -45,8 +45,8 @@ class SceneBalls:
         self._entries: dict[Key, _Entry] = {}
         self.reads = 0
 
-    def balls(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Balls | None:
-        """What a viewport shows; the same object as before where it is the same. None where no object supplies balls.
+    def fluid(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D, uses_materials: bool = False) -> Fluid | None:
+        """What a viewport shows; with the same balls as before where they are the same. None where no object supplies balls.
 
         Raises
         ------
@@ -57,18 +57,18 @@ class SceneBalls:
             return None
         key = _key(depsgraph, space)
         entry = self._entries.get(key)
-        now = self._changes.revision, tuple(depsgraph.scene.meniscus.color)
+        now = self._changes.revision, tuple(depsgraph.scene.meniscus.color), uses_materials
         if entry is None or entry.read_at != now:
-            balls = self._read(depsgraph, space)
-            if entry is not None and _is_same(balls, entry.balls):
-                balls = entry.balls
-            self._entries[key] = entry = _Entry(now, balls)
-        return entry.balls
+            fluid = self._read(depsgraph, space, uses_materials)
+            if fluid is not None and entry is not None and entry.fluid is not None and _is_same(fluid.balls, entry.fluid.balls):
+                fluid = replace(fluid, balls=entry.fluid.balls)
+            self._entries[key] = entry = _Entry(now, fluid)
+        return entry.fluid
 
-    def _read(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D) -> Balls | None:
+    def _read(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D, uses_materials: bool) -> Fluid | None:
         self.reads += 1
         try:
-            return read_balls(depsgraph, viewport=True, space=space)
+            return read_fluid(depsgraph, viewport=True, space=space, uses_materials=uses_materials)
         except NoSourceError:
             self._changes.may_have_sources = _any_source()
             return None
@@ -92,9 +92,7 @@ def _any_source() -> bool:
     return any(item.meniscus.use_fluid for item in bpy.data.objects)
 
 
-def _is_same(balls: Balls | None, other: Balls | None) -> bool:
-    if balls is None or other is None:
-        return balls is other
+def _is_same(balls: Balls, other: Balls) -> bool:
     pairs = ((getattr(balls, name), getattr(other, name)) for name in _ARRAYS)
     return balls.dropped == other.dropped and all(
         mine is theirs if mine is None or theirs is None else np.array_equal(mine, theirs) for mine, theirs in pairs

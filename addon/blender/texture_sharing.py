@@ -87,9 +87,9 @@ def textures_of(image: ImageBuffers | DeviceImage) -> Textures:
 
 
 def uploaded(pixels: npt.NDArray[np.float32]) -> gpu.types.GPUTexture:
-    """(height, width) or (height, width, 3) as a texture."""
+    """(height, width), (height, width, 3) or (height, width, 4) as a texture."""
     height, width = pixels.shape[:2]
-    if pixels.ndim == 3:
+    if pixels.ndim == 3 and pixels.shape[2] == 3:
         padded = np.ones((height, width, 4), np.float32)
         padded[..., :3] = pixels
         pixels = padded

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import gpu
@@ -26,6 +26,7 @@ from .changes import CHANGES
 from .legend import draw_legend
 from .preferences import backend_of, preferences
 from .presenter import Place, Presenter
+from .read_materials import read_lighting
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
 from .texture_sharing import SHARING
@@ -153,11 +154,16 @@ class ViewportDrawing:
         STATUS.report(problem, details)
 
     def _draw_fluid(self, context: bpy.types.Context, key: int, started: float) -> None:
-        look = read_look(context.scene)
-        balls = self._scene_balls.balls(context.view_layer.depsgraph, context.space_data)
-        if balls is None:
+        look = read_look(context.scene, context.scene.meniscus.style)
+        uses_scene = LOOK_STYLES[look.style].uses_scene
+        depsgraph = context.view_layer.depsgraph
+        fluid = self._scene_balls.fluid(depsgraph, context.space_data, uses_scene)
+        if fluid is None:
             self._show_nothing(key)
             return
+        balls = fluid.balls
+        if uses_scene:
+            look = replace(look, sources=fluid.sources, lighting=read_lighting(depsgraph, context.space_data))
         viewport = self._viewport(key)
         seen = viewport.look_at(balls)
         if seen is None:
@@ -241,7 +247,10 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
         read_field(scene),
         passes=_passes(look, balls),
         uses_thickness=style.uses_thickness,
-        contrast_radius=look.depth_contrast_radius if look.depth_contrast > 0 and style.is_lit else None,
+        contrast_radius=look.depth_contrast_radius
+        if look.depth_contrast > 0 and style.is_lit and not style.uses_scene
+        else None,
+        look=look if style.uses_scene else None,
         method=settings.method,
         backend=backend_of(scene),
         threads=chosen.threads,
@@ -253,6 +262,8 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
 
 def _passes(look: Look, balls: Balls) -> tuple[str, ...]:
     """What a look needs of the surface; colours only where the balls have some."""
+    if LOOK_STYLES[look.style].uses_scene:
+        return "depth", "normal", "combined"
     wanted = (name for name in LOOK_STYLES[look.style].passes if name != "color" or balls.colors is not None)
     return ("depth", "normal", *wanted)
 

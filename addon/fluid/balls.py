@@ -30,6 +30,8 @@ class Balls:
         (N, 3), world space, Blender units a second; None where unknown.
     ids
         (N,) integers that name the balls over time; None where unknown.
+    sources
+        (N,) or one integer: which object each ball comes from, an index; None for one and the same.
 
     Attributes
     ----------
@@ -40,7 +42,7 @@ class Balls:
     dropped
         How many balls were unusable and left out, by reason (``{"position is not finite": 3}``).
 
-    All arrays are float32 (ids: int32), C-contiguous and read-only; float32 input that is whole is not copied.
+    All arrays are float32 (ids, sources: int32), C-contiguous and read-only; float32 input that is whole is not copied.
 
     Raises
     ------
@@ -56,6 +58,7 @@ class Balls:
         colors: npt.ArrayLike | None = None,
         velocities: npt.ArrayLike | None = None,
         ids: npt.ArrayLike | None = None,
+        sources: npt.ArrayLike | None = None,
     ) -> None:
         given = _numeric("positions", positions, np.float32)
         if given.size == 0:
@@ -70,6 +73,7 @@ class Balls:
             "colors": None if colors is None else _column("colors", colors, count, (3,)),
             "velocities": None if velocities is None else _column("velocities", velocities, count, (3,)),
             "ids": None if ids is None else _column("ids", ids, count, (), np.int32),
+            "sources": None if sources is None else _column("sources", sources, count, (), np.int32),
         }
         usable, self.dropped = _usable(columns)
         for name, column in columns.items():
@@ -85,6 +89,7 @@ class Balls:
     colors: FloatArray | None
     velocities: FloatArray | None
     ids: npt.NDArray[np.int32] | None
+    sources: npt.NDArray[np.int32] | None
     dropped: dict[str, int]
 
     @cached_property
@@ -109,11 +114,16 @@ class Balls:
     @property
     def dropped_text(self) -> str:
         """One sentence that says what was left out and why, empty where nothing was."""
-        if not self.dropped:
-            return ""
-        reasons = ", ".join(f"{count} whose {reason}" for reason, count in self.dropped.items())
-        total = sum(self.dropped.values())
-        return f"{total} {'ball was' if total == 1 else 'balls were'} left out: {reasons}"
+        return dropped_text(self.dropped)
+
+
+def dropped_text(dropped: dict[str, int]) -> str:
+    """One sentence about balls that were left out, by their number for each reason; empty where none was."""
+    if not dropped:
+        return ""
+    reasons = ", ".join(f"{count} whose {reason}" for reason, count in dropped.items())
+    total = sum(dropped.values())
+    return f"{total} {'ball was' if total == 1 else 'balls were'} left out: {reasons}"
 
 
 def _numeric(name: str, values: npt.ArrayLike, dtype: type) -> npt.NDArray[Any]:

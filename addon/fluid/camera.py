@@ -225,6 +225,18 @@ class Camera:
         x_max, y_max = np.minimum(np.ceil(pixels.max(axis=0)) + 1, (self.width, self.height))
         return Region(int(x_min), int(y_min), int(x_max), int(y_max)) if x_min < x_max and y_min < y_max else None
 
+    def pixels_of(self, points: FloatArray) -> FloatArray:
+        """(N, 2): where points (N, 3) of world space are in the whole image, in pixels from its lower left.
+
+        NaN where a point is beside the eye of a perspective camera or behind it.
+        """
+        in_view = (points - self.eye) @ self.world_from_view[:3, :3]
+        places = in_view[:, :2]
+        if self.is_perspective:
+            depth = np.where(in_view[:, 2] < 0, -in_view[:, 2], np.nan)
+            places = places / depth[:, None]
+        return np.asarray((places - (self.window.left, self.window.bottom)) / self.pixel_size)
+
     def pixel_centers(self) -> tuple[FloatArray, FloatArray]:
         """Where the region's columns and rows of pixels lie in the window: (width,) and (height,)."""
         region, (pixel_width, pixel_height) = self.active_region, self.pixel_size

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .balls import dropped_text
 from .camera import Camera
+from .cryptomatte import Cryptomatte
 from .errors import InputError
 
 
@@ -38,6 +40,11 @@ class RenderInfo:
     counts: dict[str, int] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)
 
+    @property
+    def dropped_text(self) -> str:
+        """One sentence about balls that were left out, empty where none was."""
+        return dropped_text(self.dropped)
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return dict(vars(self))
@@ -57,12 +64,19 @@ class ImageBuffers:
         (height, width) bool: where there is a surface.
     info
         How the image came about.
+    objects
+        (height, width) int32: which object is seen, an index into the look's sources and what else was rendered; -1 for none.
+        None where that is not known.
+    cryptomatte
+        Mattes by object; None where nobody asked for them.
     """
 
     camera: Camera
     passes: dict[str, npt.NDArray[np.float32]]
     hit: npt.NDArray[np.bool_]
     info: RenderInfo
+    objects: npt.NDArray[np.int32] | None = None
+    cryptomatte: Cryptomatte | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float32]:
         if name not in self.passes:

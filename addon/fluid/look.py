@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
+from .lighting import FluidSource, Lighting
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class LookStyle:
         Whether there is light, and with it depth contrast.
     is_data
         Whether its colours stand for numbers, so that no view transform may change them.
+    uses_scene
+        Whether it shows materials in the light of the scene, which only the processor shades.
     """
 
     name: str
@@ -35,6 +38,7 @@ class LookStyle:
     uses_thickness: bool = False
     is_lit: bool = False
     is_data: bool = False
+    uses_scene: bool = False
 
 
 LOOK_STYLES: dict[str, LookStyle] = {
@@ -48,6 +52,14 @@ LOOK_STYLES: dict[str, LookStyle] = {
             ("color",),
             uses_thickness=True,
             is_lit=True,
+        ),
+        LookStyle(
+            "material",
+            "Materials",
+            "The materials of the sources in the light of the scene, as renders show them",
+            ("color", "ball_id"),
+            is_lit=True,
+            uses_scene=True,
         ),
         LookStyle("headlight", "Headlight", "Light from the eye, for measuring and for plain prints", ("color",), is_lit=True),
         LookStyle("flat", "Flat", "The colour of the balls, without light", ("color",)),
@@ -103,6 +115,10 @@ class Look:
     depth_contrast_radius
         How far from such an edge the light changes: the standard deviation of G, by the height of the whole image, so that
         a small preview looks like the final image. Greater than 0, at most 1.
+    sources
+        The objects that supply balls, by their index in :attr:`balls.Balls.sources`; none where nothing is known of them.
+    lighting
+        The light of the scene (material).
 
     Raises
     ------
@@ -122,6 +138,8 @@ class Look:
     speed_range: tuple[float, float] | None = None
     depth_contrast: float = 0.0
     depth_contrast_radius: float = 0.04
+    sources: tuple[FluidSource, ...] = ()
+    lighting: Lighting = Lighting()
 
     def __post_init__(self) -> None:
         if self.style not in LOOK_STYLES:

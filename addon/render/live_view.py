@@ -20,6 +20,7 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
+from ..fluid.look import Look
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
@@ -50,6 +51,8 @@ class View:
         Whether the length of the way through the fluid is needed.
     contrast_radius
         Of the depth contrast, see :class:`look.Look`; None where there is none.
+    look
+        Colours and light of the Combined pass; None where it is not among the passes.
     method, backend, threads
         As for :func:`renderer.render`.
     samples
@@ -66,6 +69,7 @@ class View:
     passes: tuple[str, ...] = ("depth", "normal")
     uses_thickness: bool = False
     contrast_radius: float | None = None
+    look: Look | None = None
     method: str = "auto"
     backend: str = "auto"
     threads: int = 0
@@ -83,13 +87,13 @@ class View:
         )
 
     def _means(self) -> tuple[object, ...]:
-        return self.field, self.passes, self.uses_thickness, self.contrast_radius, self.method, self.backend
+        return self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.method, self.backend
 
     @property
     def most_pictures(self) -> int:
         """How many samples fit into the memory."""
-        scalars = {"depth": 1, "ball_id": 1}
-        channels = sum(scalars.get(name, 3) for name in self.passes)
+        known = {"depth": 1, "ball_id": 1, "combined": 4}
+        channels = sum(known.get(name, 3) for name in self.passes)
         each = self.camera.width * self.camera.height * channels * _BYTES_PER_CHANNEL
         return max(1, min(self.samples, self.memory_limit // each))
 
@@ -299,6 +303,7 @@ class LiveRenderer:
                     method=view.method,
                     backend=view.backend,
                     passes=view.passes,
+                    look=view.look,
                     is_cancelled=is_cancelled,
                     threads=view.threads,
                     is_read_back=view.contrast_radius is not None,

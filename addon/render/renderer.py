@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -16,19 +16,15 @@ from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES, checked_passes
-from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
+from .pass_images import NEEDED, PassImages
 from .registry import create_method, method_infos
-from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
-from .thickness import at_pixels, thickness_image
+from .surroundings import Backdrop, Motion
 
-Element = TypeVar("Element", np.float32, np.bool_)
+Element = TypeVar("Element", np.float32, np.bool_, np.int32)
 
 BACKENDS = ("auto", "gpu", "cpu")
-
-# What a pass needs beside depth and normal.
-_NEEDED: dict[str, Attribute] = {"color": "color", "velocity": "velocity", "ball_id": "ball"}
 
 
 def render(
@@ -42,6 +38,8 @@ def render(
     is_cancelled: Callable[[], bool] | None = None,
     on_progress: Callable[[float], None] | None = None,
     threads: int = 0,
+    backdrop: Backdrop | None = None,
+    motion: Motion | None = None,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -61,6 +59,10 @@ def render(
         Told now and then the share of the present stage that is done, 0 to 1.
     threads
         How many threads may work on the CPU; 0 for one a core.
+    backdrop
+        What else is seen at each pixel of the camera's region, and hides the fluid where it is nearer; None for nothing.
+    motion
+        Of the camera, for the Vector pass; None where it stands still.
 
     Returns
     -------
@@ -72,6 +74,7 @@ def render(
         Each with one sentence for the user.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
+    shot = replace(shot, backdrop=backdrop, motion=motion)
     return shot.image(shot.choice.runner.find_surface(shot.request))
 
 
@@ -111,6 +114,7 @@ def render_to_show(
     method: str = "auto",
     backend: str = "auto",
     passes: Iterable[str] = ("depth", "normal"),
+    look: Look | None = None,
     is_cancelled: Callable[[], bool] | None = None,
     threads: int = 0,
     is_read_back: bool = False,
@@ -124,7 +128,7 @@ def render_to_show(
     A DeviceImage where the method runs on an OpenGL that shares its textures with Blender's and the passes can stay there, else
     ImageBuffers.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, None, is_cancelled, None, threads)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads)
     runner = shot.choice.runner
     can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
     if can_stay and isinstance(runner, DeviceMethod) and runner.shares_textures:
@@ -141,6 +145,8 @@ class _Shot:
     camera: Camera
     passes: tuple[str, ...]
     look: Look
+    backdrop: Backdrop | None = None
+    motion: Motion | None = None
 
     @classmethod
     def prepare(
@@ -160,8 +166,11 @@ class _Shot:
         if threads < 0:
             raise InputError(f"The number of threads must be 0 (one a core) or more, not {threads}")
         look = look or Look()
-        needed = {*names, *(LOOK_STYLES[look.style].passes if "combined" in names else ())}
-        attributes = frozenset(_NEEDED[name] for name in needed if name in _NEEDED)
+        is_shaded = not {"combined", "alpha"}.isdisjoint(names)
+        needed = {*names, *(LOOK_STYLES[look.style].passes if is_shaded else ())}
+        if any(source.is_holdout for source in look.sources):
+            needed.add("object_index")
+        attributes = frozenset(NEEDED[name] for name in needed if name in NEEDED)
         choice = _pick_method(method, backend, attributes)
         watch = _watch(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)
@@ -189,60 +198,10 @@ class _Shot:
         """The passes of what the method has found."""
         report = self._report(surface)
         with timed(report.milliseconds, "passes"):
-            hit = surface.hit
-            makers = self._makers(surface, hit)
-            images = {name: _in_whole_image(makers[name](), self.camera, PASSES[name].background) for name in self.passes}
-            return ImageBuffers(self.camera, images, _in_whole_image(hit, self.camera, False), report)
-
-    def _makers(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> dict[str, Callable[[], npt.NDArray[np.float32]]]:
-        """How each pass comes from the surface; all have their background where nothing is hit."""
-        camera = self.request.camera
-        return {
-            "depth": lambda: surface.depth,
-            "normal": lambda: surface.normal,
-            "position": lambda: _positions(surface.depth, hit, camera),
-            "combined": lambda: self._combined(surface, hit),
-            "color": lambda: _colors(surface, hit, self.look),
-            "velocity": lambda: _velocities(surface),
-            "ball_id": lambda: _ball_ids(surface, self.request.balls, hit),
-        }
-
-    def _combined(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-        """(height, width, 4): the look, with depth contrast."""
-        request, look = self.request, self.look
-        rgba = np.zeros((*hit.shape, 4), np.float32)
-        if not hit.any():
-            return rgba
-        ranges = Ranges(request.camera.depth_range(request.balls.bounds), (0.0, request.balls.fastest))
-        rgba[hit] = shaded(self._points(surface, hit), look, ranges)
-        return rgba
-
-    def _points(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> SurfacePoints:
-        """What is hit, as the look needs it."""
-        camera, balls = self.request.camera, self.request.balls
-        uses_thickness = LOOK_STYLES[self.look.style].uses_thickness
-        thickness = thickness_image(balls, camera, self.request.field) if uses_thickness else np.zeros((1, 1), np.float32)
-        return SurfacePoints(
-            normal=view_normals(surface.normal[hit], camera),
-            to_eye=directions_to_eye(camera, hit),
-            up=camera.world_from_view[2, :3].astype(np.float32),
-            world_normal=surface.normal[hit],
-            base=_colors(surface, hit, self.look)[hit],
-            velocity=_velocities(surface)[hit],
-            depth=surface.depth[hit],
-            ball=_ball_ids(surface, balls, hit)[hit],
-            thickness=at_pixels(thickness, camera, hit),
-            contrast=self._contrast(surface, hit)[hit],
-        )
-
-    def _contrast(self, surface: Surface, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-        """(height, width): the factor by which depth contrast changes the light."""
-        look = self.look
-        if look.depth_contrast == 0:
-            return np.ones(hit.shape, np.float32)
-        importance = spatial_importance(surface.depth, hit, self.camera, look.depth_contrast_radius)
-        # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
-        return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
+            made = PassImages(surface, self.request, self.camera, self.look, self.backdrop, self.motion)
+            images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
+            objects = _in_whole_image(made.object, self.camera, -1)
+            return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)
 
 
 @dataclass(frozen=True)
@@ -284,7 +243,7 @@ def _named_method(method: str, backend: str, attributes: frozenset[Attribute]) -
 
 def _passes_without(missing: frozenset[Attribute]) -> str:
     """Names of the passes that need one of the attributes, as text."""
-    return " and ".join(name for name, attribute in _NEEDED.items() if attribute in missing)
+    return " and ".join(name for name, attribute in NEEDED.items() if attribute in missing)
 
 
 def _watch(is_cancelled: Callable[[], bool] | None, on_progress: Callable[[float], None] | None) -> Callable[[float], None]:
@@ -295,36 +254,6 @@ def _watch(is_cancelled: Callable[[], bool] | None, on_progress: Callable[[float
             on_progress(progress)
 
     return watch
-
-
-def _positions(depth: npt.NDArray[np.float32], hit: npt.NDArray[np.bool_], camera: Camera) -> npt.NDArray[np.float32]:
-    """(height, width, 3) world space; 0 where there is no hit."""
-    origins, directions = camera.view_rays()
-    in_view = origins + np.where(hit, depth, 0)[..., None] * directions
-    positions = np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
-    positions[~hit] = 0
-    return positions
-
-
-def _colors(surface: Surface, hit: npt.NDArray[np.bool_], look: Look) -> npt.NDArray[np.float32]:
-    """(height, width, 3) linear Rec.709; the look's colour where the balls have none, 0 where there is no hit."""
-    if surface.color is not None:
-        return surface.color
-    return np.where(hit[..., None], np.array(look.color, np.float32), np.float32(0))
-
-
-def _velocities(surface: Surface) -> npt.NDArray[np.float32]:
-    """(height, width, 3) world space, Blender units a second; 0 where unknown or where there is no hit."""
-    return np.zeros_like(surface.normal) if surface.velocity is None else surface.velocity
-
-
-def _ball_ids(surface: Surface, balls: Balls, hit: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-    """(height, width): ids of the dominant balls, their indices where they have no ids; the background where there is none."""
-    ids = np.full(hit.shape, PASSES["ball_id"].background, np.float32)
-    if surface.ball is not None:
-        indices = surface.ball[hit]
-        ids[hit] = indices if balls.ids is None else balls.ids[indices]
-    return ids
 
 
 def _in_whole_image(image: npt.NDArray[Element], camera: Camera, background: float) -> npt.NDArray[Element]:

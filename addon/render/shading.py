@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from ..fluid.camera import Camera
 from ..fluid.look import SPEED_COLORS, Look
-
-FloatArray = npt.NDArray[np.float32]
+from .material_shading import Parameters, lit_materials
+from .vector_math import FloatArray, dot, highlight, schlick, unit
 
 DIELECTRIC = 0.04
 """What most materials reflect of light that falls straight on them."""
@@ -28,6 +28,8 @@ class SurfacePoints:
     ----------
     normal, to_eye, up
         Unit, view space: x to the right, y up, z to the eye. `up` (3,) is the zenith of the world.
+    position
+        View space, Blender units.
     world_normal
         Unit, world space.
     base
@@ -42,11 +44,14 @@ class SurfacePoints:
         Length of the way through the fluid, Blender units.
     contrast
         Factor of the light.
+    material
+        Of the sources, see :func:`material_shading.material_parameters`; empty where the look shows none.
     """
 
     normal: FloatArray
     to_eye: FloatArray
     up: FloatArray
+    position: FloatArray
     world_normal: FloatArray
     base: FloatArray
     velocity: FloatArray
@@ -54,6 +59,32 @@ class SurfacePoints:
     ball: FloatArray
     thickness: FloatArray
     contrast: FloatArray
+    material: Parameters
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """Light from a surface, (count, 3) each, linear Rec.709.
+
+    Attributes
+    ----------
+    radiance
+        What comes from the surface itself.
+    transmittance
+        The share of the light from behind that passes.
+    """
+
+    radiance: FloatArray
+    transmittance: FloatArray
+
+    def over(self, behind: FloatArray) -> FloatArray:
+        """(count, 4), premultiplied alpha: laid over what is `behind` (count, 4); a grey is where nothing is known of that."""
+        dimmed = self.transmittance.mean(axis=1, keepdims=True)
+        open_share = 1 - behind[:, 3:]
+        # An image has one alpha for all channels, so that what is unknown is dimmed as a whole and its tint is a grey's.
+        tint = (self.transmittance - dimmed) * GREY_BEHIND * open_share
+        color = self.radiance + self.transmittance * behind[:, :3] + tint
+        return np.concatenate([np.maximum(color, 0), 1 - dimmed * open_share], axis=1, dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -64,17 +95,11 @@ class Ranges:
     speed: tuple[float, float]
 
 
-def shaded(points: SurfacePoints, look: Look, ranges: Ranges) -> FloatArray:
-    """Colours of points as the look wants them.
-
-    Returns
-    -------
-    (count, 4) float32: linear Rec.709, premultiplied alpha.
-    """
-    faces_away = _dot(points.normal, points.to_eye) < 0
+def shaded(points: SurfacePoints, look: Look, ranges: Ranges) -> Shaded:
+    """Light from points as the look wants it."""
+    faces_away = dot(points.normal, points.to_eye) < 0
     normal = np.where(faces_away[:, None], -points.normal, points.normal)
-    rgba: FloatArray = _STYLES[look.style](points, look, ranges, normal)
-    return rgba
+    return _STYLES[look.style](points, look, ranges, normal)
 
 
 def view_normals(normal: FloatArray, camera: Camera) -> FloatArray:
@@ -94,12 +119,8 @@ def directions_to_eye(camera: Camera, hit: npt.NDArray[np.bool_]) -> FloatArray:
     return toward
 
 
-def _opaque(color: FloatArray) -> FloatArray:
-    return np.concatenate([color, np.ones_like(color[:, :1])], axis=1, dtype=np.float32)
-
-
-def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
-    return np.asarray((first * second).sum(axis=-1), np.float32)
+def _opaque(color: FloatArray) -> Shaded:
+    return Shaded(color, np.zeros_like(color))
 
 
 def _mix(low: npt.ArrayLike, high: npt.ArrayLike, share: FloatArray) -> FloatArray:
@@ -113,25 +134,7 @@ def _smoothstep(low: float, high: float, value: FloatArray) -> FloatArray:
 
 
 def _reflected(to_eye: FloatArray, normal: FloatArray) -> FloatArray:
-    return np.asarray(2 * _dot(normal, to_eye)[:, None] * normal - to_eye)
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
-def _highlight(normal: FloatArray, to_eye: FloatArray, light: FloatArray, roughness: float) -> FloatArray:
-    """Trowbridge and Reitz's distribution of facets (GGX), with the usual approximation of what they hide (Karis 2013)."""
-    between = _unit(to_eye + light)
-    alpha = max(roughness * roughness, 0.002)
-    spread = np.maximum(_dot(normal, between), 0) ** 2 * (alpha * alpha - 1) + 1
-    near = np.maximum(_dot(light, between), 0.1)
-    facets = alpha * alpha / (4 * np.pi * spread * spread * near * near * (alpha + 0.5))
-    return np.asarray(np.minimum(facets * np.maximum(_dot(normal, light), 0), 16))
-
-
-def _schlick(cosine: FloatArray, straight: FloatArray) -> FloatArray:
-    return np.asarray(straight + (1 - straight) * (1 - np.clip(cosine, 0, 1))[:, None] ** 5)
+    return np.asarray(2 * dot(normal, to_eye)[:, None] * normal - to_eye)
 
 
 def _fresnel(cosine: FloatArray, ior: float) -> FloatArray:
@@ -146,24 +149,24 @@ def _studio_room(direction: FloatArray, light: FloatArray, roughness: float) -> 
     """A studio: floor and ceiling, and a soft box around the key light."""
     room = _mix((0.10, 0.10, 0.11), (0.55, 0.60, 0.68), _smoothstep(-0.6, 0.9, direction[:, 1]))
     blur = 0.04 + 0.5 * roughness
-    box = _smoothstep(0.86 - blur, 0.86 + blur, _dot(direction, light))
+    box = _smoothstep(0.86 - blur, 0.86 + blur, dot(direction, light))
     return np.asarray(room + box[:, None] * (1 - 0.6 * roughness) * np.array([1.9, 1.85, 1.75], np.float32))
 
 
-def _studio(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
+def _studio(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
     light = np.array(look.light_direction, np.float32)
-    key = np.clip((_dot(normal, light) + 0.25) / 1.25, 0, 1)
-    from_below = _unit(np.array([-light[0], -0.35, 0.55], np.float32))
-    fill = np.clip(_dot(normal, from_below), 0, 1)
+    key = np.clip((dot(normal, light) + 0.25) / 1.25, 0, 1)
+    from_below = unit(np.array([-light[0], -0.35, 0.55], np.float32))
+    fill = np.clip(dot(normal, from_below), 0, 1)
     soft = _mix((0.45, 0.42, 0.40), (0.85, 0.92, 1.0), 0.5 + 0.5 * normal[:, 1])
     diffuse = (0.95 * key * key)[:, None] * np.array([1.0, 0.97, 0.92], np.float32)
     diffuse = (1 - look.ambient) * (diffuse + (0.18 * fill)[:, None] * np.array([0.7, 0.85, 1.0], np.float32))
     mirrored = _reflected(points.to_eye, normal)
     straight = DIELECTRIC + look.metallic * (points.base - DIELECTRIC)
-    share = _schlick(_dot(normal, points.to_eye), straight) * (1 - 0.7 * look.roughness)
+    share = schlick(dot(normal, points.to_eye), straight) * (1 - 0.7 * look.roughness)
     gloss = share * _studio_room(mirrored, light, look.roughness)
-    shine = _schlick(_dot(light, _unit(light + points.to_eye)), straight)
-    gloss += shine * _highlight(normal, points.to_eye, light, look.roughness)[:, None]
+    shine = schlick(dot(light, unit(light + points.to_eye)), straight)
+    gloss += shine * highlight(normal, points.to_eye, light, look.roughness)[:, None]
     color = (1 - look.metallic) * points.base * ((0.3 + look.ambient) * soft + diffuse) + gloss
     return _opaque((look.light_strength * points.contrast)[:, None] * color)
 
@@ -175,47 +178,46 @@ def _sky(up: FloatArray) -> FloatArray:
     return np.asarray(ground + _smoothstep(-0.25, 0.05, up)[:, None] * (above - ground))
 
 
-def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
-    reflected = _fresnel(np.maximum(_dot(normal, points.to_eye), 1e-3), look.ior)
+def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
+    reflected = _fresnel(np.maximum(dot(normal, points.to_eye), 1e-3), look.ior)
     light = np.array(look.light_direction, np.float32)
-    sun = _highlight(normal, points.to_eye, light, 0.05 + 0.6 * look.roughness)
+    sun = highlight(normal, points.to_eye, light, 0.05 + 0.6 * look.roughness)
     mirrored = _reflected(points.to_eye, normal)
-    mirrored = _unit(mirrored + look.roughness**2 * (normal - mirrored))
+    mirrored = unit(mirrored + look.roughness**2 * (normal - mirrored))
     base = np.clip(points.base, 0, 1)
     passes = np.exp(-look.absorption * points.thickness[:, None] * (1 - base))
-    mean = passes.mean(axis=1)
-    key = np.clip((_dot(normal, light) + 0.5) / 1.5, 0, 1)
-    lit = (0.4 + 1.6 * key * key)[:, None] * _sky(0.5 + 0.5 * _dot(normal, points.up))
+    key = np.clip((dot(normal, light) + 0.5) / 1.5, 0, 1)
+    lit = (0.4 + 1.6 * key * key)[:, None] * _sky(0.5 + 0.5 * dot(normal, points.up))
     within = (1 - passes) * base * lit
-    # What is behind is dimmed as a whole where it is drawn over; its tint is that of a grey.
-    tint = (passes - mean[:, None]) * GREY_BEHIND
-    color = reflected[:, None] * _sky(_dot(mirrored, points.up)) + (12 * reflected * sun)[:, None]
-    color += (1 - reflected)[:, None] * np.maximum(within + tint, 0)
-    rgba = np.empty((len(color), 4), np.float32)
-    rgba[:, :3] = (look.light_strength * points.contrast)[:, None] * color
-    rgba[:, 3] = 1 - (1 - reflected) * mean
-    return rgba
+    color = reflected[:, None] * _sky(dot(mirrored, points.up)) + (12 * reflected * sun)[:, None]
+    color += (1 - reflected)[:, None] * within
+    return Shaded((look.light_strength * points.contrast)[:, None] * color, (1 - reflected)[:, None] * passes)
 
 
-def _headlight(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> FloatArray:
-    light = look.ambient + (1 - look.ambient) * _dot(normal, points.to_eye)
+def _material(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
+    radiance, transmittance = lit_materials(normal, points.to_eye, points.position, points.base, points.material, look.lighting)
+    return Shaded(points.contrast[:, None] * radiance, transmittance)
+
+
+def _headlight(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
+    light = look.ambient + (1 - look.ambient) * dot(normal, points.to_eye)
     return _opaque((points.contrast * light)[:, None] * points.base)
 
 
-def _flat(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> FloatArray:
+def _flat(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> Shaded:
     return _opaque(points.base)
 
 
-def _normal(points: SurfacePoints, _look: Look, _ranges: Ranges, _turned: FloatArray) -> FloatArray:
+def _normal(points: SurfacePoints, _look: Look, _ranges: Ranges, _turned: FloatArray) -> Shaded:
     return _opaque((0.5 + 0.5 * np.clip(points.world_normal, -1, 1)) ** 2.2)
 
 
-def _depth(points: SurfacePoints, _look: Look, ranges: Ranges, _normal: FloatArray) -> FloatArray:
+def _depth(points: SurfacePoints, _look: Look, ranges: Ranges, _normal: FloatArray) -> Shaded:
     light = (1 - 0.9 * _share_of_range(points.depth, ranges.depth)) ** 2.2
     return _opaque(np.repeat(light[:, None], 3, axis=1))
 
 
-def _speed(points: SurfacePoints, look: Look, ranges: Ranges, _normal: FloatArray) -> FloatArray:
+def _speed(points: SurfacePoints, look: Look, ranges: Ranges, _normal: FloatArray) -> Shaded:
     speeds = np.linalg.norm(points.velocity, axis=1)
     return _opaque(speed_colors(_share_of_range(speeds, look.speed_range or ranges.speed)))
 
@@ -227,7 +229,7 @@ def speed_colors(place: FloatArray) -> FloatArray:
     return np.stack(list(channels), axis=-1).astype(np.float32)
 
 
-def _id(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> FloatArray:
+def _id(points: SurfacePoints, _look: Look, _ranges: Ranges, _normal: FloatArray) -> Shaded:
     number = _scrambled(np.maximum(points.ball, 0).astype(np.uint32))
     hue = (number & 65535) / np.float32(65536) * 6
     saturation = 0.5 + 0.45 * ((number >> 16) & 255) / np.float32(255)
@@ -248,9 +250,10 @@ def _share_of_range(value: FloatArray, ends: tuple[float, float]) -> FloatArray:
     return np.asarray(np.clip((value - ends[0]) / max(ends[1] - ends[0], 1e-12), 0, 1), np.float32)
 
 
-_STYLES: dict[str, Callable[[SurfacePoints, Look, Ranges, FloatArray], FloatArray]] = {
+_STYLES: dict[str, Callable[[SurfacePoints, Look, Ranges, FloatArray], Shaded]] = {
     "studio": _studio,
     "water": _water,
+    "material": _material,
     "headlight": _headlight,
     "flat": _flat,
     "normal": _normal,

@@ -100,9 +100,9 @@ vec4 water(LookInput seen, LookSettings look, vec3 normal) {
     vec3 within = (1.0 - passes) * clamp(seen.base, 0.0, 1.0) * lit;
     // What is behind is dimmed as a whole where it is drawn over; its tint is that of a grey.
     vec3 tint = (passes - mean) * GREY_BEHIND;
-    vec3 color = look.light_strength * (reflected * sky(dot(mirrored, seen.up)) + reflected * 12.0 * sun
-                                        + (1.0 - reflected) * max(within + tint, 0.0));
-    return vec4(color * seen.contrast, 1.0 - (1.0 - reflected) * mean);
+    vec3 color = reflected * sky(dot(mirrored, seen.up)) + reflected * 12.0 * sun + (1.0 - reflected) * within;
+    color = look.light_strength * seen.contrast * color + (1.0 - reflected) * tint;
+    return vec4(max(color, 0.0), 1.0 - (1.0 - reflected) * mean);
 }
 
 vec3 speed_color(float place) {

@@ -57,6 +57,8 @@ void main() {
     settings.ior = params.optics.y;
     settings.depth_range = params.ranges.xy;
     settings.speed_range = params.ranges.zw;
-    vec4 color = look_color(int(params.surface.z + 0.5), seen, settings);
+    int style = int(params.surface.z + 0.5);
+    // Materials are shaded before.
+    vec4 color = style == STYLE_MATERIAL ? value : look_color(style, seen, settings);
     out_color = vec4(displayed(color.rgb / max(color.a, 1e-6)) * color.a, color.a);
 }

@@ -15,9 +15,9 @@ def main(spacing: float, frame: int, frame_end: int, path: str) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(dam_break.baked_file(spacing=spacing, frame_end=frame_end)))
     bpy.context.scene.frame_set(frame)
     # Imported here because it loads bpy, which one_thread has to do first.
-    from meniscus.addon.blender.read_scene import read_balls
+    from meniscus.addon.blender.read_scene import read_fluid
 
-    balls = read_balls(bpy.context.evaluated_depsgraph_get())
+    balls = read_fluid(bpy.context.evaluated_depsgraph_get()).balls
     np.savez(path, positions=balls.positions, radii=balls.radii, weights=balls.weights)
 
 

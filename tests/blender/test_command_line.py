@@ -125,7 +125,9 @@ def test_each_file_holds_the_image_of_its_frame(
         depsgraph = bpy.context.evaluated_depsgraph_get()
         read_scene = submodule(meniscus, "blender.read_scene")
         camera = submodule(meniscus, "blender.read_camera").read_camera(depsgraph)
-        image = meniscus.render(read_scene.read_balls(depsgraph), camera, read_scene.read_field(fluid_scene), backend="cpu")
+        image = meniscus.render(
+            read_scene.read_fluid(depsgraph).balls, camera, read_scene.read_field(fluid_scene), backend="cpu"
+        )
         assert image.hit.any()
         with submodule(meniscus, "output.exr_process").ExrProcess() as writer:
             writer.write(tmp_path / "expected.exr", image, frame=frame, frames_per_second=24.0).result()
@@ -164,7 +166,7 @@ def test_the_scenes_threads_are_used(
     fluid_scene.render.threads_mode = mode
     if mode == "FIXED":
         fluid_scene.render.threads = threads
-    module = submodule(meniscus, "blender.render_frames")
+    module = submodule(meniscus, "blender.render_scene")
     render, asked = module.render, []
 
     def recording(*arguments: object, **options: object) -> object:
@@ -210,6 +212,7 @@ def test_another_view_layer_sees_its_own_objects(fluid_scene: bpy.types.Scene, r
 
 
 def test_a_preview_shows_the_fluid_in_front_of_grey(fluid_scene: bpy.types.Scene, run: Run, tmp_path: Path) -> None:
+    fluid_scene.meniscus.render_style, fluid_scene.render.film_transparent = "headlight", True
     assert run("render", "--output", "//a.exr", "--frames", "1", "--preview").status == 0
     assert names_in(tmp_path) >= {"a.exr", "a.png"}
     assert channel_names(tmp_path / "a.exr") == {f"ViewLayer.{name}" for name in DEPTH_AND_NORMAL}
@@ -386,15 +389,15 @@ def test_ctrl_c_ends_the_command_with_whole_files_only(
     number: signal.Signals,
 ) -> None:
     handler = signal.getsignal(number)
-    render_frames = submodule(meniscus, "blender.render_frames")
-    render = render_frames.render
+    render_scene = submodule(meniscus, "blender.render_scene")
+    render = render_scene.render
 
     def interrupted_render(*arguments: object, **options: object) -> object:
         if fluid_scene.frame_current == 2:
             signal.raise_signal(number)
         return render(*arguments, **options)
 
-    monkeypatch.setattr(render_frames, "render", interrupted_render)
+    monkeypatch.setattr(render_scene, "render", interrupted_render)
     result = run("render", "--output", "//####.exr")
     assert result.status == 1
     assert result.err == "meniscus: The render was cancelled\n"

@@ -22,7 +22,8 @@ def scene(empty_scene):
     render = empty_scene.render
     render.engine = "MENISCUS"
     render.resolution_x, render.resolution_y, render.resolution_percentage = *SIZE, 100
-    empty_scene.meniscus.render_samples = 4
+    render.film_transparent = True
+    empty_scene.meniscus.render_samples, empty_scene.meniscus.render_style = 4, "headlight"
     for name in ("use_pass_z", "use_pass_normal", "use_pass_position"):
         setattr(bpy.context.view_layer, name, True)
     for name in ("use_pass_color", "use_pass_velocity", "use_pass_ball_id"):
@@ -56,7 +57,12 @@ def expected(meniscus, scene, **changes):
     camera = read_camera(bpy.context.evaluated_depsgraph_get())
     passes = ("combined", "depth", "normal", "position", "color", "velocity", "ball_id")
     return meniscus.render(
-        read_balls(meniscus), camera, reader.read_field(scene), passes=passes, look=reader.read_look(scene), **changes
+        read_balls(meniscus),
+        camera,
+        reader.read_field(scene),
+        passes=passes,
+        look=reader.read_look(scene, scene.meniscus.render_style),
+        **changes,
     )
 
 
@@ -103,19 +109,19 @@ def test_without_a_camera_one_sentence_says_so(scene):
 
 
 def test_an_unexpected_error_reaches_the_user(meniscus, scene, monkeypatch):
-    engine = importlib.import_module(f"{meniscus.__name__}.addon.blender.engine")
+    engine = importlib.import_module(f"{meniscus.__name__}.addon.blender.render_scene")
 
     def fail(*_arguments, **_settings):
         raise ValueError("nobody expected this")
 
-    monkeypatch.setattr(engine, "read_balls", fail)
+    monkeypatch.setattr(engine, "read_fluid", fail)
     with pytest.raises(RuntimeError, match="nobody expected this"):
         bpy.ops.render.render()
 
 
 def test_animated_settings_count(scene, rendered):
     settings = scene.meniscus
-    settings.style, settings.color = "flat", (1, 0, 0)
+    settings.render_style, settings.color = "flat", (1, 0, 0)
     settings.keyframe_insert("color", frame=1)
     settings.color = (0, 0, 1)
     settings.keyframe_insert("color", frame=11)

@@ -141,7 +141,7 @@ def test_presets_set_all_of_field_and_look(meniscus, scene, name):
     reader = module(meniscus, "read_scene")
     scene.meniscus.absorption, scene.meniscus.light_strength, scene.meniscus.depth_contrast = 9.0, 3.0, 5.0
     assert bpy.ops.meniscus.apply_preset(preset=name) == {"FINISHED"}
-    field, look = reader.read_field(scene), reader.read_look(scene)
+    field, look = reader.read_field(scene), reader.read_look(scene, scene.meniscus.style)
     assert (field.kernel, field.isovalue) == (preset.field.kernel, pytest.approx(preset.field.isovalue))
     assert look.style == preset.look.style
     numbers = ("ambient", "roughness", "metallic", "light_strength", "absorption", "ior", "depth_contrast")

@@ -19,7 +19,7 @@ def own_properties(group):
 def test_field_and_look_of_a_new_scene_are_the_defaults(meniscus, empty_scene):
     reader = module(meniscus, "addon.blender.read_scene")
     field, look = module(meniscus, "addon.fluid.field").Field(), module(meniscus, "addon.fluid.look").Look()
-    read_field, read_look = reader.read_field(empty_scene), reader.read_look(empty_scene)
+    read_field, read_look = reader.read_field(empty_scene), reader.read_look(empty_scene, empty_scene.meniscus.style)
     assert (read_field.kernel, read_field.isovalue) == (field.kernel, pytest.approx(field.isovalue))
     assert (read_look.color, read_look.ambient) == (pytest.approx(look.color), pytest.approx(look.ambient))
     assert read_look.depth_contrast == look.depth_contrast == 0
@@ -35,7 +35,7 @@ def test_field_and_look_are_those_of_the_scene(meniscus, empty_scene):
         settings.kernel = kernel
         assert reader.read_field(empty_scene).kernel == kernel
     assert reader.read_field(empty_scene).isovalue == 0.75
-    look = reader.read_look(empty_scene)
+    look = reader.read_look(empty_scene, empty_scene.meniscus.style)
     assert (look.color, look.ambient) == ((0.5, 0.25, 0.125), 0.5)
     assert (look.depth_contrast, look.depth_contrast_radius) == (2.5, 0.0625)
 
@@ -44,7 +44,7 @@ def test_field_and_look_are_those_of_the_scene(meniscus, empty_scene):
 def test_every_depth_contrast_that_can_be_set_can_be_rendered(meniscus, empty_scene, extreme):
     settings = empty_scene.meniscus
     settings.depth_contrast = settings.depth_contrast_radius = extreme
-    look = module(meniscus, "addon.blender.read_scene").read_look(empty_scene)
+    look = module(meniscus, "addon.blender.read_scene").read_look(empty_scene, empty_scene.meniscus.style)
     assert look.depth_contrast == (100 if extreme > 0 else 0)
 
 

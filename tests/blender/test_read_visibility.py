@@ -120,7 +120,7 @@ def test_render_reads_what_is_hidden_in_the_viewport_and_animated_settings(menis
         bl_label = "Reading"
 
         def render(self, depsgraph):
-            found.extend(read_scene.read_balls(depsgraph).radii.tolist())
+            found.extend(read_scene.read_fluid(depsgraph).balls.radii.tolist())
 
     bpy.utils.register_class(ReadingEngine)
     try:

@@ -20,7 +20,7 @@ def read_balls(meniscus):
 
     def read(frame=1):
         bpy.context.scene.frame_set(frame)
-        return module.read_balls(bpy.context.evaluated_depsgraph_get())
+        return module.read_fluid(bpy.context.evaluated_depsgraph_get()).balls
 
     return read
 

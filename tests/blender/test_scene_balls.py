@@ -30,7 +30,8 @@ def reader(module, space):
     class Reader:
         def __call__(self):
             bpy.context.view_layer.update()
-            return scene_balls.balls(bpy.context.view_layer.depsgraph, space)
+            fluid = scene_balls.fluid(bpy.context.view_layer.depsgraph, space)
+            return fluid and fluid.balls
 
         @property
         def reads(self):

@@ -109,4 +109,4 @@ def test_settings_animate_and_take_drivers(meniscus):
     scene.frame_set(6)
     reader = importlib.import_module(f"{meniscus.__name__}.addon.blender.read_scene")
     assert 0.2 < reader.read_field(scene).isovalue < 0.4
-    assert reader.read_look(scene).roughness == pytest.approx(0.06)
+    assert reader.read_look(scene, scene.meniscus.style).roughness == pytest.approx(0.06)

@@ -1,0 +1,247 @@
+"""The passes, made from the surface that a method has found and from what else there is at each pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.camera import Camera
+from ..fluid.lighting import FluidSource, Material
+from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.passes import PASSES
+from .depth_contrast import spatial_importance
+from .material_shading import Parameters, lighting_in_view, material_parameters
+from .method import Attribute, Request, Surface
+from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
+from .surroundings import Backdrop, Motion
+from .thickness import at_pixels, thickness_image
+from .vector_math import dot
+
+FloatArray = npt.NDArray[np.float32]
+BoolArray = npt.NDArray[np.bool_]
+
+# What a pass needs of the surface beside depth and normal.
+NEEDED: dict[str, Attribute] = {
+    "color": "color",
+    "velocity": "velocity",
+    "speed": "velocity",
+    "vector": "velocity",
+    "ball_id": "ball",
+    "object_index": "ball",
+}
+
+
+class PassImages:
+    """All passes of one image, each made when it is asked for: arrays of the rendered region, row 0 at the bottom.
+
+    Parameters
+    ----------
+    surface, request
+        What was found, and what was asked for.
+    camera
+        What the image shows; the request's is its region.
+    look
+        Colours and light.
+    backdrop
+        What else there is.
+    motion
+        Of the camera; None where it stands still.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        request: Request,
+        camera: Camera,
+        look: Look,
+        backdrop: Backdrop | None,
+        motion: Motion | None,
+    ) -> None:
+        self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
+        self._backdrop = backdrop or Backdrop.empty(request.camera)
+        self._motion = motion
+        self._sources = look.sources or (FluidSource(material=Material(color=look.color)),)
+        self._makers: dict[str, Callable[[], FloatArray]] = {
+            "combined": lambda: self._combined,
+            "depth": lambda: self._depth,
+            "normal": lambda: self._normal,
+            "position": lambda: self._position,
+            "vector": self._vector,
+            "alpha": lambda: np.ascontiguousarray(self._combined[..., 3]),
+            "facing": self._facing,
+            "object_index": self._object_index,
+            "color": lambda: self._of_objects(self._color, self._backdrop.color, "color"),
+            "velocity": lambda: self._of_fluid(self._velocity, "velocity"),
+            "speed": lambda: self._of_fluid(np.sqrt(dot(self._velocity, self._velocity)), "speed"),
+            "ball_id": self._ball_id,
+        }
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """A pass by its name."""
+        return self._makers[name]()
+
+    @cached_property
+    def hit(self) -> BoolArray:
+        """(height, width): where fluid or another object shows itself."""
+        return self._fluid | (self._backdrop.is_seen & ~self._is_before)
+
+    @cached_property
+    def object(self) -> npt.NDArray[np.int32]:
+        """(height, width): what is seen, an index into the names of the look's sources and then the backdrop's; -1: nothing."""
+        behind = np.where(self._backdrop.is_seen, self._backdrop.object, np.int32(-1))
+        found = np.where(self._is_before | (behind < 0), np.int32(-1), behind + len(self._sources))
+        found[self._fluid] = self._source[self._fluid]
+        return np.asarray(found, np.int32)
+
+    @cached_property
+    def _is_before(self) -> BoolArray:
+        """Where fluid is nearer than all else, holdouts too."""
+        return self._surface.hit & (self._surface.depth < self._backdrop.depth)
+
+    @cached_property
+    def _fluid(self) -> BoolArray:
+        """Where fluid shows itself."""
+        holds_out = np.array([source.is_holdout for source in self._sources])
+        return self._is_before & ~holds_out[self._source] if holds_out.any() else self._is_before
+
+    @cached_property
+    def _source(self) -> npt.NDArray[np.int32]:
+        """Index of the object that the dominant ball comes from; 0 where there is no fluid."""
+        balls, ball = self._request.balls, self._surface.ball
+        if balls.sources is None or ball is None or not len(balls):
+            return np.broadcast_to(np.int32(0), self._surface.depth.shape)
+        return np.asarray(balls.sources[np.maximum(ball, 0)], np.int32)
+
+    def _of_fluid(self, values: FloatArray, name: str) -> FloatArray:
+        """The values of fluid that shows itself, else the pass's background."""
+        shown = self._fluid if values.ndim == 2 else self._fluid[..., None]
+        return np.where(shown, values, np.float32(PASSES[name].background))
+
+    def _of_objects(self, values: FloatArray, behind: FloatArray, name: str) -> FloatArray:
+        """The values of fluid, and those of other objects where these are seen."""
+        image = self._of_fluid(values, name)
+        others = self.hit & ~self._fluid
+        if others.any():
+            image[others] = behind[others]
+        return image
+
+    @cached_property
+    def _depth(self) -> FloatArray:
+        return self._of_objects(self._surface.depth, self._backdrop.depth, "depth")
+
+    @cached_property
+    def _normal(self) -> FloatArray:
+        return self._of_objects(self._surface.normal, self._backdrop.normal, "normal")
+
+    @cached_property
+    def _position(self) -> FloatArray:
+        camera = self._request.camera
+        origins, directions = camera.view_rays()
+        in_view = origins + np.where(self.hit, self._depth, 0)[..., None] * directions
+        positions = np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
+        positions[~self.hit] = 0
+        return positions
+
+    @cached_property
+    def _color(self) -> FloatArray:
+        """Linear Rec.709; the look's colour where the balls have none."""
+        if self._surface.color is not None:
+            return self._surface.color
+        return np.broadcast_to(np.array(self._look.color, np.float32), self._surface.normal.shape)
+
+    @cached_property
+    def _velocity(self) -> FloatArray:
+        """World space, Blender units a second; 0 where unknown."""
+        return np.zeros_like(self._surface.normal) if self._surface.velocity is None else self._surface.velocity
+
+    def _facing(self) -> FloatArray:
+        cosines = np.zeros(self.hit.shape, np.float32)
+        normals = view_normals(self._normal[self.hit], self._request.camera)
+        cosines[self.hit] = np.abs(dot(normals, directions_to_eye(self._request.camera, self.hit)))
+        return cosines
+
+    def _vector(self) -> FloatArray:
+        """(height, width, 4): as Cycles, where the point was by where it is, then where it is by where it will be; pixels."""
+        vector = np.zeros((*self.hit.shape, 4), np.float32)
+        camera, hit = self._whole_camera, self.hit
+        motion = self._motion or Motion(camera, camera, 0.0)
+        here = self._position[hit].astype(np.float64)
+        step = self._of_fluid(self._velocity, "velocity")[hit] * motion.seconds
+        now = camera.pixels_of(here)
+        vector[hit, :2] = motion.previous.pixels_of(here - step) - now
+        vector[hit, 2:] = now - motion.following.pixels_of(here + step)
+        # What passes the eye has no place in the other frame's image.
+        return np.nan_to_num(vector, copy=False)
+
+    def _object_index(self) -> FloatArray:
+        numbers = [source.pass_index for source in self._sources] + list(self._backdrop.pass_indices)
+        return np.where(self.object < 0, np.float32(0), np.array(numbers, np.float32)[self.object])
+
+    def _ball_id(self) -> FloatArray:
+        ball, ids = self._surface.ball, self._request.balls.ids
+        if ball is None:
+            return np.full(self.hit.shape, PASSES["ball_id"].background, np.float32)
+        named = ball if ids is None or not len(ids) else ids[np.maximum(ball, 0)]
+        return self._of_fluid(named.astype(np.float32), "ball_id")
+
+    @cached_property
+    def _combined(self) -> FloatArray:
+        """(height, width, 4): the look, with depth contrast, over what is behind."""
+        rgba = np.array(self._backdrop.rgba)
+        rgba[self._is_before & ~self._fluid] = 0
+        shown = self._fluid
+        if shown.any():
+            balls, camera = self._request.balls, self._request.camera
+            ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
+            look = replace(self._look, lighting=lighting_in_view(self._look.lighting, camera.view_from_world))
+            rgba[shown] = shaded(self._points(shown), look, ranges).over(rgba[shown])
+        return rgba
+
+    def _points(self, shown: BoolArray) -> SurfacePoints:
+        """What is shown, as the look needs it."""
+        camera, surface = self._request.camera, self._surface
+        to_eye = directions_to_eye(camera, shown)
+        return SurfacePoints(
+            normal=view_normals(surface.normal[shown], camera),
+            to_eye=to_eye,
+            up=camera.world_from_view[2, :3].astype(np.float32),
+            position=self._view_positions(shown),
+            world_normal=surface.normal[shown],
+            base=self._color[shown],
+            velocity=self._velocity[shown],
+            depth=surface.depth[shown],
+            ball=self._ball_id()[shown],
+            thickness=self._thickness(shown),
+            contrast=self._contrast(shown),
+            material=self._material(shown),
+        )
+
+    def _view_positions(self, shown: BoolArray) -> FloatArray:
+        """(count, 3) view space."""
+        origins, directions = self._request.camera.view_rays()
+        return np.asarray(origins[shown] + self._surface.depth[shown, None] * directions[shown], np.float32)
+
+    def _thickness(self, shown: BoolArray) -> FloatArray:
+        """(count,): the length of the way through the fluid, roughly, where the look needs it."""
+        if not LOOK_STYLES[self._look.style].uses_thickness:
+            return np.zeros(np.count_nonzero(shown), np.float32)
+        camera = self._request.camera
+        return at_pixels(thickness_image(self._request.balls, camera, self._request.field), camera, shown)
+
+    def _contrast(self, shown: BoolArray) -> FloatArray:
+        """(count,): the factor by which depth contrast changes the light."""
+        look = self._look
+        if look.depth_contrast == 0:
+            return np.ones(np.count_nonzero(shown), np.float32)
+        importance = spatial_importance(self._depth, self.hit, self._whole_camera, look.depth_contrast_radius)[shown]
+        # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
+        return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
+
+    def _material(self, shown: BoolArray) -> Parameters:
+        if not LOOK_STYLES[self._look.style].uses_scene:
+            return {}
+        return material_parameters(tuple(source.material for source in self._sources), self._source[shown])

@@ -1,0 +1,73 @@
+"""What a render knows beside the fluid: what else is seen at each pixel, and how the camera moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.camera import Camera
+from ..fluid.passes import DEPTH_BACKGROUND
+
+FloatArray = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """What is seen at each pixel where no fluid is: arrays of the rendered region, row 0 at the bottom.
+
+    Attributes
+    ----------
+    rgba
+        (height, width, 4): linear Rec.709, premultiplied alpha.
+    depth
+        (height, width): planar, DEPTH_BACKGROUND where nothing hides the fluid.
+    normal
+        (height, width, 3): world space, 0 where there is nothing.
+    color
+        (height, width, 3): base colour, 0 where there is nothing.
+    object
+        (height, width) int32: index into `pass_indices`, -1 where there is nothing.
+    is_holdout
+        (height, width): where what hides the fluid is not seen itself, and leaves the background of each pass.
+    names, pass_indices
+        Of the objects.
+    """
+
+    rgba: FloatArray
+    depth: FloatArray
+    normal: FloatArray
+    color: FloatArray
+    object: npt.NDArray[np.int32]
+    is_holdout: npt.NDArray[np.bool_]
+    names: tuple[str, ...] = ()
+    pass_indices: tuple[int, ...] = ()
+
+    @classmethod
+    def empty(cls, camera: Camera, rgba: tuple[float, float, float, float] = (0, 0, 0, 0)) -> Backdrop:
+        """Nothing but one colour, for a camera without region."""
+        shape = camera.height, camera.width
+        nothing = np.broadcast_to(np.float32(0), (*shape, 3))
+        return cls(
+            rgba=np.broadcast_to(np.array(rgba, np.float32), (*shape, 4)),
+            depth=np.broadcast_to(np.float32(DEPTH_BACKGROUND), shape),
+            normal=nothing,
+            color=nothing,
+            object=np.broadcast_to(np.int32(-1), shape),
+            is_holdout=np.broadcast_to(np.False_, shape),
+        )
+
+    @property
+    def is_seen(self) -> npt.NDArray[np.bool_]:
+        """(height, width): where there is an object that shows itself."""
+        return (self.depth < DEPTH_BACKGROUND) & ~self.is_holdout
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the camera is one frame before and one frame after, and the seconds from one frame to the next."""
+
+    previous: Camera
+    following: Camera
+    seconds: float
