@@ -106,10 +106,11 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         for name, pixels in images.items():
             part = pixels[region.y_min : region.y_max, region.x_min : region.x_max]
             layer.passes[name].rect.foreach_set(np.ascontiguousarray(part).reshape(-1))
-        if image.cryptomatte is not None:
-            for key, value in image.cryptomatte.metadata(view_layer.name).items():
-                result.stamp_data_add_field(key, value)
         self.end_result(result)
+        if image.cryptomatte is not None:
+            whole = self.get_result()
+            for key, value in image.cryptomatte.metadata(view_layer.name).items():
+                whole.stamp_data_add_field(key, value)
 
 
 def register() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.lighting import Light, Lighting, Material, Vector
-from .vector_math import FloatArray, dot, highlight, schlick, unit
+from .vector_math import FloatArray, dot, fresnel, highlight, schlick, unit
 
 Parameters = dict[str, FloatArray]
 """The parameters of materials by name, (count,) or (count, 3): of each point."""
@@ -60,19 +60,23 @@ def lit_materials(
         (count, 3) each, linear Rec.709: what the surface sends by itself, and the share of light from behind it that passes.
     """
     metallic, clear = material["metallic"][:, None], material["transmission"][:, None]
-    dielectric = ((material["ior"] - 1) / (material["ior"] + 1))[:, None] ** 2
-    straight = np.asarray(dielectric + metallic * (base - dielectric), np.float32)
     matt = base * (1 - metallic) * (1 - clear)
-    reflected = schlick(dot(normal, to_eye), straight)
+    reflected = _reflected(dot(normal, to_eye), base, material)
     world = np.asarray(lighting.world, np.float32)
     radiance = material["emission"] + (1 - reflected) * matt * world + reflected * world
     for light in lighting.lights:
         toward, irradiance = _LIGHTS[light.kind](light, position)
-        shine = schlick(dot(toward, unit(to_eye + toward)), straight)
+        shine = _reflected(dot(toward, unit(to_eye + toward)), base, material)
         facing = np.maximum(dot(normal, toward), 0)[:, None]
         gloss = shine * highlight(normal, to_eye, toward, material["roughness"])[:, None]
         radiance = radiance + irradiance * ((1 - shine) * matt * facing / math.pi + gloss)
     return np.asarray(radiance, np.float32), np.asarray((1 - reflected) * (1 - metallic) * clear * base, np.float32)
+
+
+def _reflected(cosine: FloatArray, base: FloatArray, material: Parameters) -> FloatArray:
+    """(count, 3): what facets reflect of light at an angle to their normal."""
+    metallic, cosine = material["metallic"][:, None], np.clip(cosine, 1e-3, 1)
+    return np.asarray((1 - metallic) * fresnel(cosine, material["ior"])[:, None] + metallic * schlick(cosine, base))
 
 
 def _vector(values: npt.NDArray[np.float64]) -> Vector:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..fluid.camera import Camera
 from ..fluid.look import SPEED_COLORS, Look
 from .material_shading import Parameters, lit_materials
-from .vector_math import FloatArray, dot, highlight, schlick, unit
+from .vector_math import FloatArray, dot, fresnel, highlight, schlick, unit
 
 DIELECTRIC = 0.04
 """What most materials reflect of light that falls straight on them."""
@@ -137,14 +137,6 @@ def _reflected(to_eye: FloatArray, normal: FloatArray) -> FloatArray:
     return np.asarray(2 * dot(normal, to_eye)[:, None] * normal - to_eye)
 
 
-def _fresnel(cosine: FloatArray, ior: float) -> FloatArray:
-    """What of unpolarized light a smooth surface reflects."""
-    within = np.sqrt(np.maximum(1 - (1 - cosine**2) / ior**2, 0))
-    across = (cosine - ior * within) / (cosine + ior * within)
-    along = (ior * cosine - within) / (ior * cosine + within)
-    return np.asarray(0.5 * (across**2 + along**2))
-
-
 def _studio_room(direction: FloatArray, light: FloatArray, roughness: float) -> FloatArray:
     """A studio: floor and ceiling, and a soft box around the key light."""
     room = _mix((0.10, 0.10, 0.11), (0.55, 0.60, 0.68), _smoothstep(-0.6, 0.9, direction[:, 1]))
@@ -179,7 +171,7 @@ def _sky(up: FloatArray) -> FloatArray:
 
 
 def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
-    reflected = _fresnel(np.maximum(dot(normal, points.to_eye), 1e-3), look.ior)
+    reflected = fresnel(np.maximum(dot(normal, points.to_eye), 1e-3), look.ior)
     light = np.array(look.light_direction, np.float32)
     sun = highlight(normal, points.to_eye, light, 0.05 + 0.6 * look.roughness)
     mirrored = _reflected(points.to_eye, normal)

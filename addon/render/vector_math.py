@@ -35,3 +35,11 @@ def highlight(normal: FloatArray, to_eye: FloatArray, light: FloatArray, roughne
 def schlick(cosine: FloatArray, straight: FloatArray) -> FloatArray:
     """(count, 3): what a surface reflects at angles (count,) to its normal, given what it reflects straight on (count, 3)."""
     return np.asarray(straight + (1 - straight) * (1 - np.clip(cosine, 0, 1))[:, None] ** 5)
+
+
+def fresnel(cosine: FloatArray, ior: float | FloatArray) -> FloatArray:
+    """What of unpolarized light a smooth surface reflects; `ior` is one number or has the shape of `cosine`."""
+    within = np.sqrt(np.maximum(1 - (1 - cosine**2) / np.square(ior, dtype=np.float32), 0))
+    across = (cosine - ior * within) / (cosine + ior * within)
+    along = (ior * cosine - within) / (ior * cosine + within)
+    return np.asarray(0.5 * (across**2 + along**2), np.float32)

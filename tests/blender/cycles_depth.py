@@ -3,28 +3,34 @@
 import os
 
 import bpy
-from exr_files import exr_channels
+from exr_files import exr_content
 
 
 def add_spheres(scene, centres, radius):
-    """A point cloud in `scene`; Cycles draws its points as exact spheres, not as meshes."""
+    """An object in `scene` with a point cloud, whose points Cycles draws as exact spheres, not as meshes."""
     mesh = bpy.data.meshes.new("Spheres")
     mesh.from_pydata(centres.tolist(), [], [])
     item = bpy.data.objects.new("Spheres", mesh)
     item.modifiers.new("Points", "NODES").node_group = _points_of_mesh(radius)
     scene.collection.objects.link(item)
+    return item
 
 
 def cycles_depth(scene, folder):
     """(height, width) float32 Depth pass of the scene's camera, row 0 at the bottom."""
-    _set_up_cycles(scene)
-    exr = os.path.join(folder, "depth.exr")
-    scene.render.filepath = exr
-    bpy.ops.render.render(write_still=True)
-    return exr_channels(exr)["ViewLayer.Depth.Z"]
+    set_up_cycles(scene)
+    return passes_of_render(scene, os.path.join(folder, "depth.exr"))[0]["ViewLayer.Depth.Z"]
 
 
-def _set_up_cycles(scene):
+def passes_of_render(scene, path):
+    """Render the scene's camera with the scene's engine; what the file at `path` then holds, see :func:`exr_content`."""
+    scene.render.filepath = str(path)
+    assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+    return exr_content(path)
+
+
+def set_up_cycles(scene):
+    """Cycles with one sample through the centres of the pixels, and renders saved as multilayer files."""
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = 1

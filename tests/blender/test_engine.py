@@ -35,7 +35,7 @@ def scene(empty_scene):
 def rendered(scene, tmp_path):
     """Renders as F12 does, and reads the passes back from the multilayer file that Blender writes; by name of the pass."""
 
-    def render():
+    def render(whole_names=False):
         settings = scene.render.image_settings
         if hasattr(settings, "media_type"):  # since 5.0
             settings.media_type = "MULTI_LAYER_IMAGE"
@@ -45,7 +45,7 @@ def rendered(scene, tmp_path):
         scene.render.filepath = str(tmp_path / "frame.exr")
         assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
         channels = exr_channels(scene.render.filepath)
-        return {name.split(".", 1)[1]: pixels for name, pixels in channels.items()}
+        return channels if whole_names else {name.split(".", 1)[1]: pixels for name, pixels in channels.items()}
 
     return render
 
@@ -146,3 +146,73 @@ def test_an_animation_renders_each_frame_anew(scene, tmp_path):
     bpy.ops.render.render(animation=True)
     contents = {path.read_bytes() for path in tmp_path.glob("f_*.png")}
     assert len(contents) == 3
+
+
+def test_the_world_is_behind_unless_film_is_transparent(scene, rendered):
+    scene.world = bpy.data.worlds.new("World")
+    if bpy.app.version < (5, 0):
+        scene.world.use_nodes = True
+    background = scene.world.node_tree.nodes["Background"].inputs
+    background["Color"].default_value, background["Strength"].default_value = (0.1, 0.2, 0.4, 1), 2.0
+    scene.render.film_transparent = False
+    passes = rendered()
+    np.testing.assert_allclose([passes[f"Combined.{channel}"][0, 0] for channel in "RGBA"], [0.2, 0.4, 0.8, 1], rtol=1e-6)
+    assert passes["Depth.Z"][0, 0] > 1e9
+    bpy.context.view_layer.use_sky = False
+    assert rendered()["Combined.A"][0, 0] == 0
+
+
+def test_each_view_layer_has_its_own_passes_and_objects(scene, rendered):
+    other = bpy.data.collections.new("Other")
+    scene.collection.children.link(other)
+    add_points(other, "Other", points=[(0, 0, 1.2)], radius=0.8)
+    second = scene.view_layers.new("Second")
+    second.use_pass_z = False
+    second.meniscus.use_pass_speed = True
+    scene.view_layers[0].layer_collection.children["Other"].exclude = True
+    passes = rendered(whole_names=True)
+    assert {"ViewLayer.Depth.Z", "Second.Speed.X"} <= passes.keys()
+    assert not {"Second.Depth.Z", "ViewLayer.Speed.X"} & passes.keys()
+    assert passes["Second.Combined.A"].sum() > passes["ViewLayer.Combined.A"].sum()
+
+
+def test_a_holdout_leaves_a_hole(scene, rendered):
+    scene.render.film_transparent = False
+    scene.world = bpy.data.worlds.new("World")
+    bpy.data.objects["Points"].is_holdout = True
+    passes = rendered()
+    assert passes["Combined.A"].min() == 0
+    assert passes["Depth.Z"].min() > 1e9
+
+
+@pytest.mark.parametrize(("position", "sides"), [("START", {"after"}), ("CENTER", {"before", "after"}), ("END", {"before"})])
+def test_motion_blur(scene, rendered, position, sides):
+    """Fluid that flies to the right is seen where it is while the shutter is open."""
+    item = bpy.data.objects["Points"]
+    for frame in (1, 11):
+        item.location.x = (frame - 6) * 0.4
+        item.keyframe_insert("location", frame=frame)
+    fcurves = item.animation_data.action
+    fcurves = fcurves.fcurves if hasattr(fcurves, "fcurves") else fcurves.layers[0].strips[0].channelbags[0].fcurves
+    for point in (point for curve in fcurves for point in curve.keyframe_points):
+        point.interpolation = "LINEAR"
+    scene.frame_set(6)
+    sharp = rendered()
+    render = scene.render
+    render.use_motion_blur, render.motion_blur_shutter, render.motion_blur_position = True, 1.0, position
+    blurred = rendered()
+    alpha, covered = blurred["Combined.A"], np.nonzero(sharp["Combined.A"].max(axis=0))[0]
+    seen = np.nonzero(alpha.max(axis=0))[0]
+    assert ("before" in sides) == (seen.min() < covered.min())
+    assert ("after" in sides) == (seen.max() > covered.max())
+    assert alpha.sum() == pytest.approx(sharp["Combined.A"].sum(), rel=0.05)
+    np.testing.assert_array_equal(blurred["Depth.Z"], sharp["Depth.Z"])
+    assert (scene.frame_current, scene.frame_subframe) == (6, 0)
+
+
+def test_coverage_of_mattes_is_antialiased(scene, rendered):
+    bpy.context.view_layer.use_pass_cryptomatte_object = True
+    passes = rendered()
+    np.testing.assert_allclose(passes["CryptoObject00.g"], passes["Combined.A"], atol=1e-6)
+    assert len(np.unique(passes["CryptoObject00.g"])) > 3
+    assert not passes["CryptoObject00.a"].any()
