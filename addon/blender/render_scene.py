@@ -144,9 +144,9 @@ class _SceneRender:
 
     @property
     def _mean_passes(self) -> tuple[str, ...]:
-        """What is the mean of samples; the mattes count what samples of some pass see."""
+        """What is asked of each sample; the mattes count the objects that they see."""
         names = tuple(name for name in self.settings.passes if PASSES[name].is_antialiased)
-        return names or (("object_index",) if self.settings.cryptomatte_levels else ())
+        return (*names, "object_index") if self.settings.cryptomatte_levels else names
 
     @property
     def _first_passes(self) -> tuple[str, ...]:

@@ -66,7 +66,7 @@ class ImageBuffers:
         How the image came about.
     objects
         (height, width) int32: which object is seen, an index into the look's sources and what else was rendered; -1 for none.
-        None where that is not known.
+        None where the Object Index pass is not there.
     cryptomatte
         Mattes by object; None where nobody asked for them.
     """

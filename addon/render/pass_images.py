@@ -62,7 +62,7 @@ class PassImages:
         motion: Motion | None,
     ) -> None:
         self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
-        self._backdrop = backdrop or Backdrop.empty(request.camera)
+        self._backdrop = backdrop
         self._motion = motion
         self._sources = look.sources or (FluidSource(material=Material(color=look.color)),)
         self._makers: dict[str, Callable[[], FloatArray]] = {
@@ -74,9 +74,9 @@ class PassImages:
             "alpha": lambda: np.ascontiguousarray(self._combined[..., 3]),
             "facing": self._facing,
             "object_index": self._object_index,
-            "color": lambda: self._of_objects(self._color, self._backdrop.color, "color"),
+            "color": self._colors,
             "velocity": lambda: self._of_fluid(self._velocity, "velocity"),
-            "speed": lambda: self._of_fluid(np.sqrt(dot(self._velocity, self._velocity)), "speed"),
+            "speed": self._speed,
             "ball_id": self._ball_id,
         }
 
@@ -87,26 +87,35 @@ class PassImages:
     @cached_property
     def hit(self) -> BoolArray:
         """(height, width): where fluid or another object shows itself."""
+        if self._backdrop is None:
+            return self._fluid
         return self._fluid | (self._backdrop.is_seen & ~self._is_before)
 
     @cached_property
-    def object(self) -> npt.NDArray[np.int32]:
+    def objects(self) -> npt.NDArray[np.int32]:
         """(height, width): what is seen, an index into the names of the look's sources and then the backdrop's; -1: nothing."""
-        behind = np.where(self._backdrop.is_seen, self._backdrop.object, np.int32(-1))
-        found = np.where(self._is_before | (behind < 0), np.int32(-1), behind + len(self._sources))
-        found[self._fluid] = self._source[self._fluid]
+        found = np.where(self._fluid, self._source, np.int32(-1))
+        others = self.hit & ~self._fluid
+        if self._backdrop is not None and others.any():
+            found[others] = self._backdrop.object[others] + len(self._sources)
         return np.asarray(found, np.int32)
 
     @cached_property
     def _is_before(self) -> BoolArray:
         """Where fluid is nearer than all else, holdouts too."""
-        return self._surface.hit & (self._surface.depth < self._backdrop.depth)
+        hit = self._surface.hit
+        return hit if self._backdrop is None else hit & (self._surface.depth < self._backdrop.depth)
 
     @cached_property
     def _fluid(self) -> BoolArray:
         """Where fluid shows itself."""
         holds_out = np.array([source.is_holdout for source in self._sources])
         return self._is_before & ~holds_out[self._source] if holds_out.any() else self._is_before
+
+    @cached_property
+    def _is_alone(self) -> bool:
+        """Whether all fluid that was found is seen: then what was found has the background of each pass already."""
+        return self._backdrop is None and self._fluid is self._is_before
 
     @cached_property
     def _source(self) -> npt.NDArray[np.int32]:
@@ -118,33 +127,40 @@ class PassImages:
 
     def _of_fluid(self, values: FloatArray, name: str) -> FloatArray:
         """The values of fluid that shows itself, else the pass's background."""
+        if self._is_alone:
+            return values
         shown = self._fluid if values.ndim == 2 else self._fluid[..., None]
         return np.where(shown, values, np.float32(PASSES[name].background))
 
-    def _of_objects(self, values: FloatArray, behind: FloatArray, name: str) -> FloatArray:
+    def _of_objects(self, name: str, values: FloatArray, behind: Callable[[Backdrop], FloatArray]) -> FloatArray:
         """The values of fluid, and those of other objects where these are seen."""
         image = self._of_fluid(values, name)
-        others = self.hit & ~self._fluid
-        if others.any():
-            image[others] = behind[others]
+        if self._backdrop is not None:
+            others = self.hit & ~self._fluid
+            image[others] = behind(self._backdrop)[others]
         return image
 
     @cached_property
     def _depth(self) -> FloatArray:
-        return self._of_objects(self._surface.depth, self._backdrop.depth, "depth")
+        return self._of_objects("depth", self._surface.depth, lambda backdrop: backdrop.depth)
 
     @cached_property
     def _normal(self) -> FloatArray:
-        return self._of_objects(self._surface.normal, self._backdrop.normal, "normal")
+        return self._of_objects("normal", self._surface.normal, lambda backdrop: backdrop.normal)
 
     @cached_property
     def _position(self) -> FloatArray:
-        camera = self._request.camera
-        origins, directions = camera.view_rays()
-        in_view = origins + np.where(self.hit, self._depth, 0)[..., None] * directions
-        positions = np.asarray(in_view @ camera.world_from_view[:3, :3].T + camera.eye, np.float32)
-        positions[~self.hit] = 0
+        positions = np.zeros((*self.hit.shape, 3), np.float32)
+        turn = self._request.camera.world_from_view[:3, :3].astype(np.float32)
+        positions[self.hit] = self._places(self.hit, self._depth) @ turn.T + self._request.camera.eye.astype(np.float32)
         return positions
+
+    def _places(self, shown: BoolArray, depth: FloatArray) -> FloatArray:
+        """(count, 3): where pixels look at in view space, at planar depths (height, width)."""
+        rows, columns = np.nonzero(shown)
+        x, y = (centers.astype(np.float32) for centers in self._request.camera.pixel_centers())
+        found, scale = depth[shown], depth[shown] if self._request.camera.is_perspective else np.float32(1)
+        return np.stack([x[columns] * scale, y[rows] * scale, -found], axis=1)
 
     @cached_property
     def _color(self) -> FloatArray:
@@ -158,6 +174,16 @@ class PassImages:
         """World space, Blender units a second; 0 where unknown."""
         return np.zeros_like(self._surface.normal) if self._surface.velocity is None else self._surface.velocity
 
+    def _colors(self) -> FloatArray:
+        if self._surface.color is not None:
+            return self._of_objects("color", self._color, lambda backdrop: backdrop.color)
+        colors = np.where(self._surface.hit[..., None], self._color, np.float32(0))
+        return self._of_objects("color", colors, lambda backdrop: backdrop.color)
+
+    def _speed(self) -> FloatArray:
+        velocity = self._velocity
+        return self._of_fluid(np.sqrt(np.einsum("ijk,ijk->ij", velocity, velocity)), "speed")
+
     def _facing(self) -> FloatArray:
         cosines = np.zeros(self.hit.shape, np.float32)
         normals = view_normals(self._normal[self.hit], self._request.camera)
@@ -170,7 +196,7 @@ class PassImages:
         camera, hit = self._whole_camera, self.hit
         motion = self._motion or Motion(camera, camera, 0.0)
         here = self._position[hit].astype(np.float64)
-        step = self._of_fluid(self._velocity, "velocity")[hit] * motion.seconds
+        step = self._of_fluid(self._velocity, "velocity")[hit] * np.float64(motion.seconds)
         now = camera.pixels_of(here)
         vector[hit, :2] = motion.previous.pixels_of(here - step) - now
         vector[hit, 2:] = now - motion.following.pixels_of(here + step)
@@ -178,22 +204,27 @@ class PassImages:
         return np.nan_to_num(vector, copy=False)
 
     def _object_index(self) -> FloatArray:
-        numbers = [source.pass_index for source in self._sources] + list(self._backdrop.pass_indices)
-        return np.where(self.object < 0, np.float32(0), np.array(numbers, np.float32)[self.object])
+        numbers = [source.pass_index for source in self._sources]
+        numbers += self._backdrop.pass_indices if self._backdrop is not None else ()
+        # The last number, which -1 takes, is that of nothing.
+        return np.array([*numbers, 0], np.float32)[self.objects]
 
     def _ball_id(self) -> FloatArray:
         ball, ids = self._surface.ball, self._request.balls.ids
         if ball is None:
             return np.full(self.hit.shape, PASSES["ball_id"].background, np.float32)
-        named = ball if ids is None or not len(ids) else ids[np.maximum(ball, 0)]
-        return self._of_fluid(named.astype(np.float32), "ball_id")
+        numbers = ball.astype(np.float32)
+        if ids is not None:
+            numbers[self._surface.hit] = ids[ball[self._surface.hit]]
+        return self._of_fluid(numbers, "ball_id")
 
     @cached_property
     def _combined(self) -> FloatArray:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
-        rgba = np.array(self._backdrop.rgba)
-        rgba[self._is_before & ~self._fluid] = 0
         shown = self._fluid
+        rgba = np.zeros((*shown.shape, 4), np.float32) if self._backdrop is None else np.array(self._backdrop.rgba)
+        if not self._is_alone:
+            rgba[self._is_before & ~shown] = 0
         if shown.any():
             balls, camera = self._request.balls, self._request.camera
             ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
@@ -209,7 +240,7 @@ class PassImages:
             normal=view_normals(surface.normal[shown], camera),
             to_eye=to_eye,
             up=camera.world_from_view[2, :3].astype(np.float32),
-            position=self._view_positions(shown),
+            position=self._places(shown, surface.depth),
             world_normal=surface.normal[shown],
             base=self._color[shown],
             velocity=self._velocity[shown],
@@ -219,11 +250,6 @@ class PassImages:
             contrast=self._contrast(shown),
             material=self._material(shown),
         )
-
-    def _view_positions(self, shown: BoolArray) -> FloatArray:
-        """(count, 3) view space."""
-        origins, directions = self._request.camera.view_rays()
-        return np.asarray(origins[shown] + self._surface.depth[shown, None] * directions[shown], np.float32)
 
     def _thickness(self, shown: BoolArray) -> FloatArray:
         """(count,): the length of the way through the fluid, roughly, where the look needs it."""

@@ -200,7 +200,7 @@ class _Shot:
         with timed(report.milliseconds, "passes"):
             made = PassImages(surface, self.request, self.camera, self.look, self.backdrop, self.motion)
             images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
-            objects = _in_whole_image(made.object, self.camera, -1)
+            objects = _in_whole_image(made.objects, self.camera, -1) if "object_index" in self.passes else None
             return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)
 
 
