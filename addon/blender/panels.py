@@ -291,7 +291,9 @@ class MENISCUS_PT_render_look(_PropertiesPanel, bpy.types.Panel):
         return context.engine == ENGINE
 
     def draw(self, context: bpy.types.Context) -> None:
-        _split(self.layout).prop(context.scene.meniscus, "render_style", text="Look")
+        layout = _split(self.layout)
+        layout.prop(context.scene.meniscus, "render_style", text="Look")
+        layout.prop(context.scene.meniscus, "render_meshes")
 
 
 class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):

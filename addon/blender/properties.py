@@ -232,6 +232,21 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         items=stable_items((style.name, style.label, style.description) for style in LOOK_STYLES.values()),
         default="material",
     )
+    render_meshes: EnumProperty(
+        name="Meshes",
+        description="How renders show what is not fluid",
+        items=(
+            ("SHADED", "Shaded", "Plainly shaded, without shadows; fluid hides them and is hidden by them", 0),
+            (
+                "HOLDOUT",
+                "Holdout",
+                "Not seen, but the fluid that they hide is not seen either: to be laid over another render",
+                1,
+            ),
+            ("NONE", "Hidden", "Neither seen nor hiding fluid", 2),
+        ),
+        default="SHADED",
+    )
     color: FloatVectorProperty(
         name="Color",
         description="Surface colour of fluids that have no colour of their own",

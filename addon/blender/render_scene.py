@@ -11,10 +11,13 @@ import bpy
 
 from ..fluid.camera import Camera
 from ..fluid.cryptomatte import Coverage
+from ..fluid.errors import CancelledError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
 from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.meshes import Meshes
 from ..fluid.passes import PASSES
+from ..render.backdrop import backdrop
 from ..render.method import timed
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
@@ -22,6 +25,7 @@ from ..render.samples import sample_offset
 from ..render.surroundings import Backdrop, Motion
 from .read_camera import read_camera
 from .read_materials import read_lighting
+from .read_meshes import read_meshes
 from .read_scene import Fluid, read_field, read_fluid, read_look
 
 MOST_STEPS = 8
@@ -108,14 +112,12 @@ class _Moment:
     field: Field
     look: Look
     background: tuple[float, float, float, float]
+    meshes: Meshes | None
 
     @property
     def object_names(self) -> tuple[str, ...]:
-        return tuple(source.name for source in self.look.sources)
-
-    def backdrop(self, camera: Camera) -> Backdrop:
-        """What else than fluid is seen through a camera, which is this one's or nearly so."""
-        return Backdrop.empty(camera.cropped(), self.background)
+        others = self.meshes.objects if self.meshes is not None else ()
+        return tuple(item.name for item in (*self.look.sources, *others))
 
 
 @dataclass
@@ -168,6 +170,7 @@ class _SceneRender:
             field=read_field(scene),
             look=replace(look, sources=fluid.sources, lighting=lighting),
             background=(0.0, 0.0, 0.0, 0.0) if is_clear else (*lighting.world, 1.0),
+            meshes=read_meshes(self.depsgraph) if scene.meniscus.render_meshes != "NONE" else None,
         )
 
     def _motion(self) -> Motion | None:
@@ -206,6 +209,24 @@ class _SceneRender:
         frame = math.floor(time)
         self.control.set_frame(frame, time - frame)
 
+    def _backdrop(self, moment: _Moment, camera: Camera) -> Backdrop | None:
+        """What else than fluid is seen; None where that is nothing."""
+        if moment.meshes is None or not len(moment.meshes):
+            return Backdrop.empty(camera.cropped(), moment.background) if moment.background[3] > 0 else None
+        return backdrop(
+            moment.meshes,
+            camera.cropped(),
+            moment.look.lighting,
+            moment.background,
+            are_holdouts=self._scene.meniscus.render_meshes == "HOLDOUT",
+            threads=self.settings.threads,
+            watch=self._watch,
+        )
+
+    def _watch(self, _share: float) -> None:
+        if self.control.is_cancelled():
+            raise CancelledError("The render was cancelled")
+
     def _shot(self, moment: _Moment, camera: Camera, passes: tuple[str, ...], motion: Motion | None = None) -> ImageBuffers:
         return render(
             moment.fluid.balls,
@@ -217,7 +238,7 @@ class _SceneRender:
             look=moment.look,
             is_cancelled=self.control.is_cancelled,
             threads=self.settings.threads,
-            backdrop=moment.backdrop(camera),
+            backdrop=self._backdrop(moment, camera),
             motion=motion,
         )
 

@@ -62,8 +62,8 @@ class Source:
         return self.world_from_object @ np.linalg.inv(original)
 
 
-ShownTest = Callable[[Source, bpy.types.Object], bool]
-"""Says whether a source is visible, given the object of the view layer that puts it where it is."""
+ShownTest = Callable[[bpy.types.Object, bpy.types.Object], bool]
+"""Says whether an object is visible, given the object of the view layer that puts it where it is."""
 
 
 def visible_sources(
@@ -93,23 +93,24 @@ def visible_sources(
         raise NoSourceError(
             "No object supplies balls: enable Meniscus in the object properties of one with particles or points"
         )
-    is_shown = _shown_in_viewport(depsgraph, space) if viewport else _shown_in_render(depsgraph)
+    is_shown = _shown_in_viewport(depsgraph, space) if viewport else shown_in_render(depsgraph)
     for source, owner in _places(depsgraph, fluid):
-        if is_shown(source, owner):
+        if is_shown(source.object, owner):
             yield source
 
 
 def _shown_in_viewport(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None) -> ShownTest:
     # The dependency graph also holds the objects of hidden collections, because a viewport may have its own choice of them.
-    return lambda source, owner: owner.original.visible_get(view_layer=depsgraph.view_layer, viewport=space)
+    return lambda item, owner: owner.original.visible_get(view_layer=depsgraph.view_layer, viewport=space)
 
 
-def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+def shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    """Whether a render shows an object; InputError where the viewport's dependency graph lacks a fluid that it does."""
     if depsgraph.mode == "RENDER":
-        return lambda source, owner: True
+        return lambda item, owner: True
     renderable = _renderable_objects(depsgraph.view_layer)
     _check_evaluated(depsgraph, renderable)
-    return lambda source, owner: not source.object.hide_render and owner.original.as_pointer() in renderable
+    return lambda item, owner: not item.hide_render and owner.original.as_pointer() in renderable
 
 
 def _places(depsgraph: bpy.types.Depsgraph, fluid: set[int]) -> Iterator[tuple[Source, bpy.types.Object]]:

@@ -244,6 +244,14 @@ class Camera:
         y = self.window.bottom + (np.arange(region.y_min, region.y_max) + 0.5) * pixel_height
         return x.astype(np.float64, copy=False), y.astype(np.float64, copy=False)
 
+    def view_positions(self, shown: npt.NDArray[np.bool_], depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """(count, 3) view space: what pixels (height, width) of the region show at planar depths (height, width)."""
+        rows, columns = np.nonzero(shown)
+        x, y = (centers.astype(np.float32) for centers in self.pixel_centers())
+        found = depth[shown]
+        scale = found if self.is_perspective else np.float32(1)
+        return np.stack([x[columns] * scale, y[rows] * scale, -found], axis=1)
+
     def view_rays(self) -> tuple[FloatArray, FloatArray]:
         """Rays through the pixel centres of the region, in view space.
 

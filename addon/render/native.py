@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.balls import Balls
+from ..fluid.camera import Camera
 from ..fluid.errors import DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 
@@ -34,6 +35,21 @@ def load() -> Any:
 def fluid_arguments(balls: Balls, field: Field) -> tuple[Any, ...]:
     """The first arguments of the module's functions and classes."""
     return balls.positions, balls.radii, balls.weights, field.density_kernel.coefficients, field.isovalue
+
+
+def view_arguments(camera: Camera) -> dict[str, Any]:
+    """A camera without region, as the module's functions and classes take it by name."""
+    right, up, backward = camera.world_from_view[:3, :3].T.tolist()
+    window = camera.window
+    return {
+        "camera_from_world": [right, up, [-number for number in backward]],
+        "eye": camera.eye.tolist(),
+        "window": [window.left, window.right, window.bottom, window.top],
+        "is_perspective": camera.is_perspective,
+        "width": camera.width,
+        "height": camera.height,
+        "clip": [camera.clip_start, camera.clip_end],
+    }
 
 
 def numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:

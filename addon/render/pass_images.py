@@ -151,16 +151,10 @@ class PassImages:
     @cached_property
     def _position(self) -> FloatArray:
         positions = np.zeros((*self.hit.shape, 3), np.float32)
-        turn = self._request.camera.world_from_view[:3, :3].astype(np.float32)
-        positions[self.hit] = self._places(self.hit, self._depth) @ turn.T + self._request.camera.eye.astype(np.float32)
+        camera = self._request.camera
+        turn = camera.world_from_view[:3, :3].astype(np.float32)
+        positions[self.hit] = camera.view_positions(self.hit, self._depth) @ turn.T + camera.eye.astype(np.float32)
         return positions
-
-    def _places(self, shown: BoolArray, depth: FloatArray) -> FloatArray:
-        """(count, 3): where pixels look at in view space, at planar depths (height, width)."""
-        rows, columns = np.nonzero(shown)
-        x, y = (centers.astype(np.float32) for centers in self._request.camera.pixel_centers())
-        found, scale = depth[shown], depth[shown] if self._request.camera.is_perspective else np.float32(1)
-        return np.stack([x[columns] * scale, y[rows] * scale, -found], axis=1)
 
     @cached_property
     def _color(self) -> FloatArray:
@@ -240,7 +234,7 @@ class PassImages:
             normal=view_normals(surface.normal[shown], camera),
             to_eye=to_eye,
             up=camera.world_from_view[2, :3].astype(np.float32),
-            position=self._places(shown, surface.depth),
+            position=camera.view_positions(shown, surface.depth),
             world_normal=surface.normal[shown],
             base=self._color[shown],
             velocity=self._velocity[shown],

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...fluid.camera import Camera
 from ...fluid.passes import DEPTH_BACKGROUND
 from .. import native
 from ..method import Request, Surface, timed
@@ -54,7 +53,7 @@ class TileCaster:
     def _caster(self, request: Request) -> Any:
         return self._native.TileCaster(
             *native.fluid_arguments(request.balls, request.field),
-            **_view(request.camera),
+            **native.view_arguments(request.camera),
             threads=request.threads,
             watch=request.watch,
         )
@@ -77,21 +76,6 @@ class TileCaster:
 def create() -> TileCaster:
     """The method, ready to run; raises DeviceError where the native core is missing."""
     return TileCaster()
-
-
-def _view(camera: Camera) -> dict[str, Any]:
-    """The camera as the native core wants it."""
-    right, up, backward = camera.world_from_view[:3, :3].T.tolist()
-    window = camera.window
-    return {
-        "camera_from_world": [right, up, [-number for number in backward]],
-        "eye": camera.eye.tolist(),
-        "window": [window.left, window.right, window.bottom, window.top],
-        "is_perspective": camera.is_perspective,
-        "width": camera.width,
-        "height": camera.height,
-        "clip": [camera.clip_start, camera.clip_end],
-    }
 
 
 def _unfilled(request: Request) -> Surface:

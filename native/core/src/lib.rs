@@ -11,5 +11,6 @@ pub mod job;
 pub mod kernel;
 pub mod memory;
 pub mod oracle;
+pub mod rasterizer;
 pub mod simd;
 pub mod tile_caster;

@@ -4,6 +4,7 @@
 mod arrays;
 mod fitted_bvh;
 mod oracle;
+mod rasterizer;
 mod run;
 mod tile_caster;
 
@@ -17,6 +18,8 @@ mod meniscus_native {
     use super::fitted_bvh::FittedBvh;
     #[pymodule_export]
     use super::oracle::{oracle_cast, oracle_crossings};
+    #[pymodule_export]
+    use super::rasterizer::rasterize;
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
 

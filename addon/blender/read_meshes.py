@@ -1,0 +1,164 @@
+"""The meshes of a Blender scene that a render shows beside the fluid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.lighting import Material
+from ..fluid.meshes import Meshes, MeshObject
+from .read_materials import read_material
+from .visible_sources import settings_of, shown_in_render
+
+_WITH_SURFACE = {"CURVE", "SURFACE", "FONT", "META"}
+"""Types of objects that have a surface but no mesh."""
+
+
+def read_meshes(depsgraph: bpy.types.Depsgraph) -> Meshes:
+    """All surfaces of a view layer that are not fluid, at its current frame, instances too.
+
+    Parameters
+    ----------
+    depsgraph
+        Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
+    """
+    collected = _Collected(depsgraph.view_layer)
+    if depsgraph.view_layer.use_solid:
+        for instance in _shown_instances(depsgraph):
+            collected.add(instance)
+    return collected.meshes()
+
+
+def _shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+    """What there is to be seen; each is valid only until the next one is taken."""
+    is_shown = shown_in_render(depsgraph)
+    for instance in depsgraph.object_instances:
+        item = instance.instance_object if instance.is_instance else instance.object
+        owner = instance.parent if instance.is_instance else item
+        if instance.show_self and is_shown(item, owner) and not _is_fluid(instance, item, depsgraph):
+            view_layer = depsgraph.view_layer
+            if item.visible_camera and not owner.original.indirect_only_get(view_layer=view_layer):
+                yield instance
+
+
+def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether fluid takes the place of a surface: points and domains do of their own, particles of what they instance."""
+    if instance.particle_system is not None:
+        return bool(settings_of(instance.parent, depsgraph).use_fluid)
+    settings = settings_of(item, depsgraph)
+    if not settings.use_fluid:
+        return False
+    is_domain = any(modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" for modifier in item.modifiers)
+    has_particles = any(system.settings.type != "HAIR" for system in item.particle_systems)
+    return is_domain or settings.source == "POINTS" or not has_particles
+
+
+@dataclass(frozen=True)
+class _MeshArrays:
+    """A mesh in its own space: vertices (V, 3), triangles (T, 3), corner normals (T, 3, 3), material slots (T,)."""
+
+    vertices: npt.NDArray[np.float32]
+    triangles: npt.NDArray[np.int32]
+    normals: npt.NDArray[np.float32]
+    slots: npt.NDArray[np.int32]
+
+
+@dataclass
+class _Collected:
+    """Surfaces as they come; each mesh is read once, however often it is instanced."""
+
+    view_layer: bpy.types.ViewLayer
+    known: dict[int, _MeshArrays] = field(default_factory=dict)
+    parts: list[tuple[_MeshArrays, npt.NDArray[np.int32], npt.NDArray[np.int32]]] = field(default_factory=list)
+    objects: dict[MeshObject, int] = field(default_factory=dict)
+    materials: dict[Material, int] = field(default_factory=dict)
+
+    def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        """Take the surface of an instance, if it has one."""
+        item = instance.object
+        arrays = self._arrays(item)
+        if arrays is None or not len(arrays.triangles):
+            return
+        owner = (instance.parent if instance.is_instance else item).original
+        known = MeshObject(item.name, item.pass_index, item.is_holdout or owner.holdout_get(view_layer=self.view_layer))
+        index = self.objects.setdefault(known, len(self.objects))
+        slots = np.array([self._material(material) for material in self._materials_of(item)], np.int32)
+        placed = _placed(arrays, np.array(instance.matrix_world, np.float64))
+        materials = slots[np.clip(arrays.slots, 0, len(slots) - 1)]
+        self.parts.append((placed, np.full(len(materials), index, np.int32), materials))
+
+    def meshes(self) -> Meshes:
+        """All together."""
+        counts = [len(arrays.vertices) for arrays, _, _ in self.parts]
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int32) if counts else ()
+        return Meshes(
+            vertices=_joined([arrays.vertices for arrays, _, _ in self.parts], (0, 3), np.float32),
+            triangles=_joined(
+                [arrays.triangles + start for (arrays, _, _), start in zip(self.parts, starts, strict=True)], (0, 3), np.int32
+            ),
+            normals=_joined([arrays.normals for arrays, _, _ in self.parts], (0, 3, 3), np.float32),
+            object=_joined([objects for _, objects, _ in self.parts], (0,), np.int32),
+            material=_joined([materials for _, _, materials in self.parts], (0,), np.int32),
+            objects=tuple(self.objects),
+            materials=tuple(self.materials),
+        )
+
+    def _materials_of(self, item: bpy.types.Object) -> list[bpy.types.Material | None]:
+        if self.view_layer.material_override is not None:
+            return [self.view_layer.material_override]
+        return [slot.material for slot in item.material_slots] or [None]
+
+    def _material(self, material: bpy.types.Material | None) -> int:
+        return self.materials.setdefault(read_material(material), len(self.materials))
+
+    def _arrays(self, item: bpy.types.Object) -> _MeshArrays | None:
+        if isinstance(item.data, bpy.types.Mesh):
+            key = item.data.as_pointer()
+            if key not in self.known:
+                self.known[key] = _read_mesh(item.data)
+            return self.known[key]
+        if item.type not in _WITH_SURFACE:
+            return None
+        try:
+            mesh = item.to_mesh()
+            return None if mesh is None else _read_mesh(mesh)
+        finally:
+            item.to_mesh_clear()
+
+
+def _read_mesh(mesh: bpy.types.Mesh) -> _MeshArrays:
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    triangles, corners = np.empty(3 * count, np.int32), np.empty(3 * count, np.int32)
+    slots, vertices = np.empty(count, np.int32), np.empty(3 * len(mesh.vertices), np.float32)
+    normals = np.empty(3 * len(mesh.corner_normals), np.float32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    mesh.loop_triangles.foreach_get("loops", corners)
+    mesh.loop_triangles.foreach_get("material_index", slots)
+    mesh.vertices.foreach_get("co", vertices)
+    mesh.corner_normals.foreach_get("vector", normals)
+    return _MeshArrays(
+        vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3)[corners].reshape(-1, 3, 3), slots
+    )
+
+
+def _placed(arrays: _MeshArrays, world_from_object: npt.NDArray[np.float64]) -> _MeshArrays:
+    """A mesh in world space."""
+    linear = world_from_object[:3, :3]
+    # Cofactors turn normals as the inverse transposed does, and exist for flat transforms too; mirrored ones turn them around.
+    cofactors = np.stack(
+        [np.cross(linear[:, 1], linear[:, 2]), np.cross(linear[:, 2], linear[:, 0]), np.cross(linear[:, 0], linear[:, 1])],
+        axis=1,
+    )
+    normals = arrays.normals @ cofactors.T.astype(np.float32)
+    lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+    vertices = arrays.vertices @ linear.T.astype(np.float32) + world_from_object[:3, 3].astype(np.float32)
+    return _MeshArrays(vertices, arrays.triangles, normals / np.maximum(lengths, 1e-30), arrays.slots)
+
+
+def _joined(parts: list[npt.NDArray], empty_shape: tuple[int, ...], dtype: type) -> npt.NDArray:
+    return np.ascontiguousarray(np.concatenate(parts), dtype) if parts else np.empty(empty_shape, dtype)

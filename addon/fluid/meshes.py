@@ -1,0 +1,89 @@
+"""The meshes of a scene, which hide fluid and are hidden by it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+from .lighting import Material
+
+
+@dataclass(frozen=True)
+class MeshObject:
+    """An object with triangles.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    pass_index
+        The number that it has in the Object Index pass.
+    is_holdout
+        Whether it leaves a hole in the image.
+    """
+
+    name: str
+    pass_index: int = 0
+    is_holdout: bool = False
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """Triangles, world space, Blender units.
+
+    Attributes
+    ----------
+    vertices
+        (V, 3) float32.
+    triangles
+        (T, 3) int32: the vertices of the corners.
+    normals
+        (T, 3, 3) float32: unit, of each corner.
+    object, material
+        (T,) int32: indices into `objects` and `materials`.
+    objects, materials
+        What the triangles belong to.
+
+    Raises
+    ------
+    InputError
+        An array has another shape or type, or an index is out of range.
+    """
+
+    vertices: npt.NDArray[np.float32]
+    triangles: npt.NDArray[np.int32]
+    normals: npt.NDArray[np.float32]
+    object: npt.NDArray[np.int32]
+    material: npt.NDArray[np.int32]
+    objects: tuple[MeshObject, ...]
+    materials: tuple[Material, ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.triangles)
+        expected = {
+            "vertices": ((len(self.vertices), 3), np.float32),
+            "triangles": ((count, 3), np.int32),
+            "normals": ((count, 3, 3), np.float32),
+            "object": ((count,), np.int32),
+            "material": ((count,), np.int32),
+        }
+        for name, (shape, dtype) in expected.items():
+            array = getattr(self, name)
+            if array.shape != shape or array.dtype != dtype:
+                raise InputError(
+                    f"{name} of meshes must be {np.dtype(dtype)} of the shape {shape}, not {array.dtype} of {array.shape}"
+                )
+        for name, limit in (
+            ("triangles", len(self.vertices)),
+            ("object", len(self.objects)),
+            ("material", len(self.materials)),
+        ):
+            array = getattr(self, name)
+            if count and not (array.min() >= 0 and array.max() < limit):
+                raise InputError(f"An index in {name} of meshes is out of range")
+
+    def __len__(self) -> int:
+        return len(self.triangles)
