@@ -366,6 +366,7 @@ class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
 
     use_pass_alpha: BoolProperty(name="Alpha", description=PASSES["alpha"].description)
     use_pass_facing: BoolProperty(name="Facing", description=PASSES["facing"].description)
+    use_pass_thickness: BoolProperty(name="Thickness", description=PASSES["thickness"].description)
     use_pass_color: BoolProperty(name="Color", description=PASSES["color"].description)
     use_pass_velocity: BoolProperty(name="Velocity", description=PASSES["velocity"].description)
     use_pass_speed: BoolProperty(name="Speed", description=PASSES["speed"].description)

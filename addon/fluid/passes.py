@@ -58,6 +58,7 @@ PASSES: dict[str, Pass] = {
         Pass(
             "facing", "Facing", "X", 0.0, False, "Cosine between normal and line of sight: 1 where the surface faces the camera"
         ),
+        Pass("thickness", "Thickness", "X", 0.0, False, "Length of the ray in the fluid, Blender units"),
         Pass("object_index", "Object Index", "X", 0.0, False, "Pass index of the object that supplies the ball"),
         Pass("color", "Color", "RGB", 0.0, True, "Blended colour of the balls, before any light"),
         Pass("velocity", "Velocity", "XYZ", 0.0, False, "Blended velocity of the balls, world space, Blender units a second"),

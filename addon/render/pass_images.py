@@ -17,6 +17,7 @@ from .depth_contrast import spatial_importance
 from .material_shading import Parameters, lighting_in_view, material_parameters
 from .method import Attribute, Request, Surface
 from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
+from .spans import find_spans
 from .surroundings import Backdrop, Motion
 from .thickness import at_pixels, thickness_image
 from .vector_math import dot
@@ -73,6 +74,7 @@ class PassImages:
             "vector": self._vector,
             "alpha": lambda: np.ascontiguousarray(self._combined[..., 3]),
             "facing": self._facing,
+            "thickness": self._length,
             "object_index": self._object_index,
             "color": self._colors,
             "velocity": lambda: self._of_fluid(self._velocity, "velocity"),
@@ -196,6 +198,13 @@ class PassImages:
         vector[hit, 2:] = now - motion.following.pixels_of(here + step)
         # What passes the eye has no place in the other frame's image.
         return np.nan_to_num(vector, copy=False)
+
+    def _length(self) -> FloatArray:
+        request = self._request
+        spans = find_spans(request.balls, request.camera, request.field, request.threads, request.watch)
+        if self._backdrop is not None:
+            spans = spans.before(self._backdrop.depth)
+        return self._of_fluid(spans.thickness, "thickness")
 
     def _object_index(self) -> FloatArray:
         numbers = [source.pass_index for source in self._sources]
