@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Balls": ".addon.fluid.balls",
     "Camera": ".addon.fluid.camera",
+    "DeepImage": ".addon.fluid.deep_image",
     "Field": ".addon.fluid.field",
     "FittedBvh": ".addon.render.fitted_bvh",
     "ImageBuffers": ".addon.fluid.image",
@@ -22,7 +23,9 @@ _HOMES = {
     "methods": ".addon.render.registry",
     "oracle": ".addon.render.oracle",
     "render": ".addon.render.renderer",
+    "render_deep": ".addon.render.deep",
     "render_progressively": ".addon.render.renderer",
+    "write_deep_exr": ".addon.output.exr",
     "write_exr": ".addon.output.exr",
 }
 

@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from ..fluid.errors import InputError
 from ..fluid.passes import PASSES, checked_passes
-from ..output.exr import COMPRESSIONS
+from ..output.exr_content import COMPRESSIONS
 
 _EXAMPLE = """
 example:

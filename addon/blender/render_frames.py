@@ -13,6 +13,7 @@ import bpy
 
 from ..fluid.errors import CancelledError, MeniscusError, OutputError
 from ..fluid.image import ImageBuffers, RenderInfo
+from ..output.exr_content import ExrOptions, flat_content
 from ..output.exr_process import ExrProcess
 from ..output.frame_path import frame_path
 from ..output.whole_file import prepare_place
@@ -38,7 +39,7 @@ class RenderJob:
     passes
         Names of those that are written.
     compression
-        See :data:`exr.COMPRESSIONS`.
+        See :data:`exr_content.COMPRESSIONS`.
     use_preview
         Whether each file gets a PNG picture beside it.
     """
@@ -138,14 +139,14 @@ def _begin_frame(job: RenderJob, frame: int, writer: ExrProcess, is_cancelled: C
         raise CancelledError("The render was cancelled")
     report = FrameReport(frame, frame_path(job.output, frame))
     image = _rendered(job, report, is_cancelled)
-    writing = writer.write(
-        report.path,
-        replace(image, passes={name: image[name] for name in job.passes}),
+    options = ExrOptions(
         view_layer=job.view_layer.name,
         compression=job.compression,
         frame=frame,
         frames_per_second=job.scene.render.fps / job.scene.render.fps_base,
     )
+    written = replace(image, passes={name: image[name] for name in job.passes})
+    writing = writer.write(report.path, flat_content(written, options))
     if job.use_preview:
         _write_preview(image, report)
     return _Underway(report, writing)

@@ -1,7 +1,7 @@
 """What runs in the child process of :mod:`exr_process`: takes file contents from a pipe and writes them.
 
-A request is one line of JSON (path, attributes and, by channel, name, type and shape), then the channels' bytes in the same
-order. The answer is one line of JSON: the error's sentence, empty where all went well.
+A request is one line of JSON (path and, by part, attributes and, by array, name, type and shape), then the arrays' bytes in
+the same order. The answer is one line of JSON: the error's sentence, empty where all went well.
 """
 
 from __future__ import annotations
@@ -17,17 +17,27 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.errors import MeniscusError
-from .exr import ExrContent, write_content
+from .exr import write_content
+from .exr_content import ExrContent, ExrPart
 
 
 def send_request(stream: IO[bytes], path: str, content: ExrContent) -> None:
     """The parent's side: ask for `content` to be written to `path`."""
-    channels = [[name, values.dtype.name, values.shape] for name, values in content.channels.items()]
-    head = {"path": path, "attributes": content.attributes, "channels": channels}
-    stream.write(json.dumps(head).encode() + b"\n")
-    for values in content.channels.values():
-        stream.write(values.data)
+    parts = [
+        {"attributes": part.attributes, "arrays": [[name, values.dtype.name, values.shape] for name, values in _arrays(part)]}
+        for part in content.parts
+    ]
+    stream.write(json.dumps({"path": path, "parts": parts}).encode() + b"\n")
+    for part in content.parts:
+        for _, values in _arrays(part):
+            stream.write(values.data)
     stream.flush()
+
+
+def _arrays(part: ExrPart) -> list[tuple[str | None, npt.NDArray[Any]]]:
+    """The channels by name, and under no name the counts of a deep part."""
+    counts = [] if part.counts is None else [(None, part.counts)]
+    return [*part.channels.items(), *counts]
 
 
 def read_answer(stream: IO[bytes]) -> str | None:
@@ -58,16 +68,22 @@ def _private_stdout() -> BufferedWriter:
 
 def _answer(requests: BufferedReader, head_line: bytes) -> str:
     head = json.loads(head_line)
-    channels = {name: _read_array(requests, dtype, shape) for name, dtype, shape in head["channels"]}
+    parts = [_read_part(requests, part) for part in head["parts"]]
     try:
-        write_content(head["path"], ExrContent(head["attributes"], channels))
+        write_content(head["path"], ExrContent(tuple(parts)))
     except MeniscusError as error:
         return str(error)
     return ""
 
 
+def _read_part(requests: BufferedReader, head: dict[str, Any]) -> ExrPart:
+    arrays = {name: _read_array(requests, dtype, shape) for name, dtype, shape in head["arrays"]}
+    counts = arrays.pop(None, None)
+    return ExrPart(head["attributes"], arrays, counts)
+
+
 def _read_array(stream: BufferedReader, dtype: str, shape: list[int]) -> npt.NDArray[Any]:
     values = np.empty(shape, dtype)
-    if stream.readinto(values.data.cast("B")) != values.nbytes:
+    if values.nbytes and stream.readinto(values.data.cast("B")) != values.nbytes:
         sys.exit("Meniscus ended in the middle of an image, which was not written")
     return values

@@ -18,9 +18,8 @@ from pathlib import Path
 from typing import IO, cast
 
 from ..fluid.errors import OutputError
-from ..fluid.image import ImageBuffers
-from .exr import ExrContent, exr_content
 from .exr_child import read_answer, send_request
+from .exr_content import ExrContent
 from .whole_file import temporary_path
 
 MAX_IN_FLIGHT = 2
@@ -61,31 +60,14 @@ class ExrProcess:
         """Wait for all files."""
         self.close()
 
-    def write(
-        self,
-        path: str | os.PathLike[str],
-        image: ImageBuffers,
-        *,
-        view_layer: str = "ViewLayer",
-        compression: str = "ZIP",
-        frame: int | None = None,
-        frames_per_second: float | None = None,
-    ) -> Future[float]:
-        """Begin to write `image`, see :func:`exr.write_exr`.
+    def write(self, path: str | os.PathLike[str], content: ExrContent) -> Future[float]:
+        """Begin to write a file, see :func:`exr.write_content`.
 
         Returns
         -------
         A future that is done when the file is whole: the milliseconds that this took, or the :class:`OutputError` that says
         why it failed.
-
-        Raises
-        ------
-        InputError
-            The compression is unknown or the view layer has no name.
         """
-        content = exr_content(
-            image, view_layer=view_layer, compression=compression, frame=frame, frames_per_second=frames_per_second
-        )
         self._free_places.acquire()
         future = self._worker.submit(self._write, Path(path).absolute(), content)
         future.add_done_callback(lambda _: self._free_places.release())

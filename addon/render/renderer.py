@@ -172,7 +172,7 @@ class _Shot:
             needed.add("object_index")
         attributes = frozenset(NEEDED[name] for name in needed if name in NEEDED)
         choice = _pick_method(method, backend, attributes)
-        watch = _watch(is_cancelled, on_progress)
+        watch = watch_of(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)
         return cls(choice, request, camera, names, look)
 
@@ -246,7 +246,9 @@ def _passes_without(missing: frozenset[Attribute]) -> str:
     return " and ".join(name for name, attribute in NEEDED.items() if attribute in missing)
 
 
-def _watch(is_cancelled: Callable[[], bool] | None, on_progress: Callable[[float], None] | None) -> Callable[[float], None]:
+def watch_of(is_cancelled: Callable[[], bool] | None, on_progress: Callable[[float], None] | None) -> Callable[[float], None]:
+    """What methods call, see :class:`method.Request`."""
+
     def watch(progress: float) -> None:
         if is_cancelled is not None and is_cancelled():
             raise CancelledError("The render was cancelled")

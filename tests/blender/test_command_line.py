@@ -129,8 +129,10 @@ def test_each_file_holds_the_image_of_its_frame(
             read_scene.read_fluid(depsgraph).balls, camera, read_scene.read_field(fluid_scene), backend="cpu"
         )
         assert image.hit.any()
+        content = submodule(meniscus, "output.exr_content")
+        options = content.ExrOptions(frame=frame, frames_per_second=24.0)
         with submodule(meniscus, "output.exr_process").ExrProcess() as writer:
-            writer.write(tmp_path / "expected.exr", image, frame=frame, frames_per_second=24.0).result()
+            writer.write(tmp_path / "expected.exr", content.flat_content(image, options)).result()
         assert (tmp_path / f"{frame:04}.exr").read_bytes() == (tmp_path / "expected.exr").read_bytes()
     assert (tmp_path / "0002.exr").read_bytes() != (tmp_path / "0004.exr").read_bytes()
 

@@ -25,11 +25,13 @@ def random_image(meniscus: ModuleType) -> object:
     return image_module.ImageBuffers(camera, passes, passes["depth"] < 1e10, image_module.RenderInfo())
 
 
-def write_in_child(meniscus: ModuleType, path: Path, image: object) -> None:
+def write_in_child(meniscus: ModuleType, path: Path, image: object, **options: object) -> None:
     """In some builds of Blender the OpenEXR package cannot live in the process."""
     exr_process = importlib.import_module(f"{meniscus.__name__}.addon.output.exr_process")
+    module = importlib.import_module(f"{meniscus.__name__}.addon.output.exr_content")
+    content = module.flat_content(image, module.ExrOptions(**options))
     with exr_process.ExrProcess() as writer:
-        writer.write(path, image).result()
+        writer.write(path, content).result()
 
 
 def compositor_tree(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.Node]:
@@ -66,12 +68,13 @@ def pixels_through_compositor(scene: bpy.types.Scene, source: Path, layer: str, 
     return pixels.reshape(HEIGHT, WIDTH, 4)
 
 
+@pytest.mark.parametrize("is_multipart", [False, True])
 @pytest.mark.parametrize("layer", ["Combined", "Depth", "Normal", "Position"])
 def test_blender_reads_each_pass_bit_for_bit(
-    meniscus: ModuleType, empty_scene: bpy.types.Scene, tmp_path: Path, layer: str
+    meniscus: ModuleType, empty_scene: bpy.types.Scene, tmp_path: Path, layer: str, is_multipart: bool
 ) -> None:
     image = random_image(meniscus)
-    write_in_child(meniscus, tmp_path / "image.exr", image)
+    write_in_child(meniscus, tmp_path / "image.exr", image, is_multipart=is_multipart)
     pixels = pixels_through_compositor(empty_scene, tmp_path / "image.exr", layer, tmp_path / "result.exr")
     expected = image[layer.lower()].reshape(HEIGHT, WIDTH, -1)
     if layer == "Combined":
@@ -79,8 +82,11 @@ def test_blender_reads_each_pass_bit_for_bit(
     assert np.array_equal(pixels[..., : expected.shape[2]], expected)
 
 
-def test_blender_offers_every_pass_as_a_layer(meniscus: ModuleType, empty_scene: bpy.types.Scene, tmp_path: Path) -> None:
-    write_in_child(meniscus, tmp_path / "image.exr", random_image(meniscus))
+@pytest.mark.parametrize("is_multipart", [False, True])
+def test_blender_offers_every_pass_as_a_layer(
+    meniscus: ModuleType, empty_scene: bpy.types.Scene, tmp_path: Path, is_multipart: bool
+) -> None:
+    write_in_child(meniscus, tmp_path / "image.exr", random_image(meniscus), is_multipart=is_multipart)
     tree, _ = compositor_tree(empty_scene)
     node = tree.nodes.new("CompositorNodeImage")
     node.image = bpy.data.images.load(str(tmp_path / "image.exr"))

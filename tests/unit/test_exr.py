@@ -11,9 +11,11 @@ import OpenEXR
 import pytest
 
 from meniscus.addon.fluid.camera import Camera, Region, Window
+from meniscus.addon.fluid.cryptomatte import Coverage
 from meniscus.addon.fluid.errors import InputError, OutputError
 from meniscus.addon.fluid.image import ImageBuffers, RenderInfo
-from meniscus.addon.output.exr import COMPRESSIONS, write_exr
+from meniscus.addon.output.exr import write_exr
+from meniscus.addon.output.exr_content import COMPRESSIONS
 from meniscus.addon.output.whole_file import whole_file
 
 WIDTH, HEIGHT = 23, 17
@@ -256,3 +258,51 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
         interrupted_write(tmp_path / "image.exr")
     assert [path.name for path in tmp_path.iterdir()] == ["image.exr"]
     assert (tmp_path / "image.exr").read_bytes() == b"old"
+
+
+def test_multipart_files_have_a_part_for_each_pass(tmp_path: Path) -> None:
+    image = random_image()
+    write_exr(tmp_path / "one.exr", image)
+    write_exr(tmp_path / "many.exr", image, is_multipart=True, frame=3)
+    with OpenEXR.File(str(tmp_path / "many.exr"), separate_channels=True) as file:
+        assert [part.name() for part in file.parts] == [
+            f"ViewLayer.{name}" for name in ("Depth", "Normal", "Position", "Combined")
+        ]
+        channels = {name: channel.pixels for part in file.parts for name, channel in part.channels.items()}
+        assert all(part.header["imageCounter"] == 3 and "worldToCamera" in part.header for part in file.parts)
+    single = read_exr(tmp_path / "one.exr")[1]
+    assert channels.keys() == single.keys()
+    for name, pixels in single.items():
+        np.testing.assert_array_equal(channels[name], pixels)
+
+
+@pytest.mark.parametrize("is_multipart", [False, True])
+def test_mattes_and_their_manifest_are_written(tmp_path: Path, is_multipart: bool) -> None:
+    image, coverage = random_image(), Coverage(2)
+    coverage.add(np.zeros((HEIGHT, WIDTH), np.int32), ("Cube",))
+    mattes = replace(image, cryptomatte=coverage.cryptomatte((HEIGHT, WIDTH)))
+    write_exr(tmp_path / "image.exr", mattes, is_multipart=is_multipart)
+    with OpenEXR.File(str(tmp_path / "image.exr"), separate_channels=True) as file:
+        header = dict(file.header())
+        channels = {name: channel.pixels.copy() for part in file.parts for name, channel in part.channels.items()}
+    assert header["cryptomatte/542cafa/manifest"] == '{"Cube": "a8fce865"}'
+    assert channels["ViewLayer.CryptoObject00.r"].view(np.uint32)[0, 0] == 0xA8FCE865
+    assert channels["ViewLayer.CryptoObject00.g"].min() == 1
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_the_matrices_project_known_points(tmp_path: Path, camera: Camera) -> None:
+    """A point that a pixel shows comes out at that pixel, and at its depth, for a reader who knows only the standard."""
+    origins, directions = camera.view_rays()
+    depth = 4.2
+    in_view = origins + depth * directions
+    world = in_view @ camera.world_from_view[:3, :3].T + camera.eye
+    write_exr(tmp_path / "image.exr", random_image(camera))
+    header, _ = read_exr(tmp_path / "image.exr")
+    row, column = 4, 9
+    point = np.append(world[row, column], 1.0)
+    in_camera = point @ np.array(header["worldToCamera"], np.float64).reshape(4, 4)
+    assert in_camera[2] == pytest.approx(depth, rel=1e-5)
+    projected = point @ np.array(header["worldToNDC"], np.float64).reshape(4, 4)
+    x, y = projected[:2] / projected[3]
+    assert (x * WIDTH, (1 - y) * HEIGHT) == pytest.approx((column + 0.5, row + 0.5), abs=1e-3)
