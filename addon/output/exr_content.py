@@ -81,8 +81,8 @@ class ExrOptions:
     frames_per_second
         Stored as a fraction: 23.976 and the like as 24000/1001, others with a denominator of at most 1001.
     is_multipart
-        Whether each pass is a part of its own, as Blender 5 writes; programs read then only what they need. Else one part holds
-        all channels, which older programs want.
+        Whether each pass is a part of its own, as Blender 5 writes; programs then read only what they need. Else one part holds
+        all channels; Blender before 4.5 reads no other.
 
     Raises
     ------
