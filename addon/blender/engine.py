@@ -77,6 +77,8 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             method=scene.meniscus.method,
             backend=backend_of(scene),
             threads=threads_of(scene),
+            # Not the scene's own where the compositor of another scene asks.
+            resolution=(self.resolution_x, self.resolution_y),
         )
         image = render_scene(depsgraph, settings, RenderControl(self._set_frame, self.test_break, self._show_progress))
         if image.info.dropped_text:

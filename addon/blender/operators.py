@@ -9,8 +9,11 @@ import gpu
 from bpy.props import EnumProperty
 
 from ... import __version__
+from ..fluid.errors import MeniscusError
+from .compositing import MERGES, add_compositing, fluid_scene_of
+from .engine import ENGINE
 from .presets import PRESETS, apply_preset
-from .sources import active_source, problem_of, use_as_fluid, use_no_more
+from .sources import active_source, has_sources, problem_of, use_as_fluid, use_no_more
 from .viewport_status import STATUS
 
 Result = set[str]
@@ -144,6 +147,39 @@ class MENISCUS_OT_copy_problem(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MENISCUS_OT_add_compositing(bpy.types.Operator):
+    """Render the fluid in a scene of its own, and lay it over this one in the compositor; other nodes stay as they are"""
+
+    bl_idname = "meniscus.add_compositing"
+    bl_label = "Composite Fluid over Scene"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    merge: EnumProperty(name="Merge", description="How fluid and scene are put together", items=MERGES, default="HOLDOUT")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        fluid = fluid_scene_of(scene)
+        if scene.render.engine == ENGINE:
+            cls.poll_message_set("Meniscus renders this scene itself: choose Cycles or EEVEE as its engine first")
+        elif not has_sources(scene):
+            cls.poll_message_set("The scene has no fluid: use an object as fluid first")
+        elif fluid is not None:
+            cls.poll_message_set(f"The compositor lays the fluid of '{fluid.name}' over this scene already")
+        else:
+            return True
+        return False
+
+    def execute(self, context: bpy.types.Context) -> Result:
+        try:
+            fluid = add_compositing(context.scene, context.view_layer, self.merge)
+        except MeniscusError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Renders now lay the fluid of '{fluid.name}' over this scene")
+        return {"FINISHED"}
+
+
 def _selected(context: bpy.types.Context) -> list[bpy.types.Object]:
     return list(context.view_layer.objects.selected)
 
@@ -161,6 +197,7 @@ def problem_text() -> str:
 _CLASSES = (
     MENISCUS_OT_add_sources,
     MENISCUS_OT_remove_source,
+    MENISCUS_OT_add_compositing,
     MENISCUS_OT_select_source,
     MENISCUS_OT_apply_preset,
     MENISCUS_OT_copy_problem,

@@ -12,6 +12,7 @@ from bl_ui.utils import PresetPanel
 from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
 from ..fluid.passes import PASSES
+from .compositing import fluid_scene_of
 from .engine import ENGINE
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
@@ -264,6 +265,24 @@ class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
         _draw_look(self.layout, context.scene.meniscus)
 
 
+class MENISCUS_PT_compositing(_PropertiesPanel, bpy.types.Panel):
+    """The fluid over what another engine renders."""
+
+    bl_label = "Meniscus Compositing"
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine != ENGINE and has_sources(context.scene)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        fluid = fluid_scene_of(context.scene)
+        if fluid is None:
+            self.layout.operator_menu_enum("meniscus.add_compositing", "merge", icon="NODE_COMPOSITING")
+        else:
+            _draw_text(self.layout, f"The compositor lays the fluid of '{fluid.name}' over this scene.", "CHECKMARK")
+
+
 class MENISCUS_PT_sampling(_PropertiesPanel, bpy.types.Panel):
     """Antialiasing of the render engine."""
 
@@ -440,6 +459,7 @@ _CLASSES = (
     MENISCUS_PT_particles,
     MENISCUS_PT_data,
     MENISCUS_PT_scene,
+    MENISCUS_PT_compositing,
     MENISCUS_PT_sampling,
     MENISCUS_PT_render_look,
     MENISCUS_PT_passes,
