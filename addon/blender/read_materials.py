@@ -11,9 +11,15 @@ import numpy as np
 from ..fluid.lighting import FluidSource, Light, Lighting, Material, Vector
 
 
-def read_source(item: bpy.types.Object) -> FluidSource:
-    """What a render knows of an evaluated object that supplies balls."""
-    return FluidSource(item.name, item.pass_index, read_material(_material_of(item)), item.is_holdout)
+def read_source(item: bpy.types.Object, view_layer: bpy.types.ViewLayer, settings: bpy.types.PropertyGroup) -> FluidSource:
+    """What a render knows of an evaluated object that supplies balls; `settings` are those of the scene.
+
+    Where it has no material it looks as the scene's settings say.
+    """
+    material = view_layer.material_override or _material_of(item)
+    plain = Material(tuple(settings.color), settings.metallic, settings.roughness, ior=settings.ior)
+    is_holdout = item.is_holdout or item.original.holdout_get(view_layer=view_layer)
+    return FluidSource(item.name, item.pass_index, plain if material is None else read_material(material), is_holdout)
 
 
 def read_material(material: bpy.types.Material | None) -> Material:

@@ -65,15 +65,15 @@ def read_fluid(
     """
     parts: list[BallPart] = []
     objects: dict[str, FluidSource] = {}
+    settings = settings_of(depsgraph.scene_eval, depsgraph)
     for source in visible_sources(depsgraph, viewport, space):
-        known = objects.setdefault(source.object.name_full, read_source(source.object))
+        known = objects.setdefault(source.object.name_full, read_source(source.object, depsgraph.view_layer, settings))
         index = list(objects).index(source.object.name_full)
         parts += [
             replace(part, source=index, colors=known.material.color if uses_materials and part.colors is None else part.colors)
             for part in _parts_of(source, depsgraph, viewport)
         ]
-    scene_color = tuple(settings_of(depsgraph.scene_eval, depsgraph).color)
-    return Fluid(_joined([part for part in parts if len(part)], scene_color), tuple(objects.values()))
+    return Fluid(_joined([part for part in parts if len(part)], tuple(settings.color)), tuple(objects.values()))
 
 
 def read_field(scene: bpy.types.Scene) -> Field:

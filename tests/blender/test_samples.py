@@ -165,3 +165,18 @@ def share_in_view(scene, positions):
     clip_from_world = np.array(projection @ camera.matrix_world.inverted())
     clip = np.column_stack([positions, np.ones(len(positions))]) @ clip_from_world.T
     return np.mean(np.all(np.abs(clip[:, :2]) < clip[:, 3:], axis=1))
+
+
+def test_the_dam_break_is_composited_over_cycles(sample, empty_scene, tmp_path):
+    sample("dam_break").build(empty_scene, spacing=0.15, frame_end=2)
+    composite = sample("composite")
+    composite.furnish(empty_scene)
+    empty_scene.render.resolution_percentage = 10
+    composite.render(empty_scene, tmp_path / "picture.png", 2, 4)
+    picture = bpy.data.images.load(str(tmp_path / "picture.png"))
+    width, height = picture.size
+    assert (width, height) == (128, 72)
+    pixels = np.array(picture.pixels, np.float32).reshape(height, width, 4)
+    red, blue = pixels[..., 0], pixels[..., 2]
+    assert (blue > 3 * red).mean() > 0.05, "water"
+    assert (red > 2 * blue).mean() > 0.01, "what stands in it and before it"
