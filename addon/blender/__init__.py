@@ -12,6 +12,7 @@ _SUBMODULES = (
     "version_update",
     "operators",
     "engine",
+    "export",
     "panels",
     "changes",
     "command_line",

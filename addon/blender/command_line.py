@@ -10,15 +10,14 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, TextIO
 
 import bpy
 
 from ..fluid.errors import InputError, MeniscusError
-from ..output.frame_path import numbered_pattern
 from ..output.whole_file import whole_file
 from .command_line_arguments import parse_arguments
+from .output_pattern import output_pattern
 from .preferences import backend_of, threads_of
 from .render_frames import FrameReport, RenderJob, render_frames
 from .render_scene import RenderSettings
@@ -78,7 +77,7 @@ def _render(options: argparse.Namespace) -> int:
     _print_summary(job, reports, progress)
     if options.json:
         _write_json(options.json, {"frames_wanted": len(job.frames), "error": error, "frames": reports})
-    return 0 if _count_written(reports) == len(job.frames) else 1
+    return 0 if sum(1 for report in reports if not report.error) == len(job.frames) else 1
 
 
 def _job(options: argparse.Namespace) -> RenderJob:
@@ -88,23 +87,28 @@ def _job(options: argparse.Namespace) -> RenderJob:
     if not frames:
         raise InputError(f"The scene's frame range {scene.frame_start} to {scene.frame_end} is empty; use --frames")
     view_layer = _view_layer(scene, options.view_layer)
+    settings = RenderSettings(
+        passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
+        cryptomatte_levels=cryptomatte_levels(view_layer),
+        samples=options.samples or scene.meniscus.render_samples,
+        method=options.method or scene.meniscus.method,
+        backend=options.backend or backend_of(scene),
+        threads=threads_of(scene),
+        camera=_camera(scene, options.camera),
+        resolution=options.resolution,
+    )
     return RenderJob(
         scene=scene,
         view_layer=view_layer,
-        settings=RenderSettings(
-            passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
-            cryptomatte_levels=cryptomatte_levels(view_layer),
-            samples=options.samples or scene.meniscus.render_samples,
-            method=options.method or scene.meniscus.method,
-            backend=options.backend or backend_of(scene),
-            threads=threads_of(scene),
-            camera=_camera(scene, options.camera),
-            resolution=options.resolution,
-        ),
+        settings=settings,
         frames=frames,
-        output=_output(options.output, len(frames)),
+        output=output_pattern(options.output, scene, view_layer, settings, len(frames)),
         passes=options.passes,
+        layout=options.layout.upper(),
+        use_deep=options.deep,
         compression=options.compression,
+        use_overwrite=scene.render.use_overwrite if options.overwrite is None else options.overwrite,
+        use_placeholders=scene.render.use_placeholder if options.placeholders is None else options.placeholders,
         use_preview=options.preview,
     )
 
@@ -123,18 +127,6 @@ def _camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None
     if name not in scene.objects:
         raise InputError(f"The scene has no object '{name}' to use as its camera; check the name")
     return scene.objects[name]
-
-
-def _output(pattern: str, frame_count: int) -> str:
-    """Absolute path with ``####`` where several frames need it."""
-    if pattern.startswith("//") and not bpy.data.filepath:
-        raise InputError(f"'{pattern}' is relative to the .blend file, but none is open; give an absolute path")
-    if pattern.endswith(("/", "\\")) or Path(bpy.path.abspath(pattern)).is_dir():
-        raise InputError(f"'{pattern}' is a folder; add a file name such as fluid_####.exr")
-    absolute = str(Path(bpy.path.abspath(pattern)).absolute())
-    if not absolute.lower().endswith(".exr"):
-        absolute += ".exr"
-    return absolute if frame_count == 1 else numbered_pattern(absolute)
 
 
 @contextmanager
@@ -160,16 +152,22 @@ def _print_frame(report: FrameReport, place: str, stream: TextIO) -> None:
     if report.error:
         print(f"{head}: {report.error}", file=sys.stderr, flush=True)
         return
+    if report.was_there:
+        print(f"{head}: left out, because it is there or claimed: {report.paths[0]}", file=stream, flush=True)
+        return
     balls, spent = report.info.counts.get("balls", 0), sum(report.info.milliseconds.values())
-    print(f"{head}: {balls:,} balls, {spent:,.0f} ms, {report.info.device}, {report.path}", file=stream, flush=True)
-    if report.left_out:
-        print(f"{head}: {report.left_out}", file=sys.stderr, flush=True)
+    print(f"{head}: {balls:,} balls, {spent:,.0f} ms, {report.info.device}, {report.paths[0]}", file=stream, flush=True)
+    if report.note:
+        print(f"{head}: {report.note}", file=sys.stderr, flush=True)
 
 
 def _print_summary(job: RenderJob, reports: list[FrameReport], stream: TextIO) -> None:
     written = _count_written(reports)
     failed = sum(1 for report in reports if report.error)
     parts = [f"Meniscus wrote {written} of {len(job.frames)} frames"]
+    there = sum(1 for report in reports if report.was_there)
+    if there:
+        parts.append(f"{there} were there or claimed")
     if failed:
         parts.append(f"{failed} failed")
     if len(reports) < len(job.frames):
@@ -182,7 +180,7 @@ def _print_summary(job: RenderJob, reports: list[FrameReport], stream: TextIO) -
 
 
 def _count_written(reports: list[FrameReport]) -> int:
-    return sum(1 for report in reports if not report.error)
+    return sum(1 for report in reports if not report.error and not report.was_there)
 
 
 def _write_json(target: str, summary: dict[str, Any]) -> None:

@@ -66,7 +66,8 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help="where to write; // is the folder of the .blend file and #### the frame number",
+        help="where to write; // is the folder of the .blend file and #### the frame number; {blend_name}, {scene_name}, "
+        "{view_layer}, {camera_name}, {fps}, {resolution_x}, {resolution_y} and {pass} are replaced",
     )
     render.add_argument("--camera", metavar="NAME", help="a camera object; the scene's camera if left out")
     render.add_argument(
@@ -85,6 +86,24 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     render.add_argument("--method", metavar="NAME", help="how the surface is found; the scene's choice if left out")
     render.add_argument("--backend", metavar="NAME", help="auto, gpu or cpu; the scene's choice if left out")
     render.add_argument("--compression", choices=COMPRESSIONS, default="ZIP", help="all lossless; ZIP if left out")
+    render.add_argument(
+        "--layout",
+        choices=("multilayer", "multipart", "passes"),
+        default="multilayer",
+        help="all passes in one part of a file, each in a part of its own, or in a file of its own; multilayer if left out",
+    )
+    render.add_argument("--deep", action="store_true", help="write a deep file beside each frame's others, NAME_deep")
+    render.add_argument(
+        "--overwrite",
+        action=argparse.BooleanOptionalAction,
+        help="write files again that are there, or leave their frames out; the scene's choice if left out",
+    )
+    render.add_argument(
+        "--placeholders",
+        action=argparse.BooleanOptionalAction,
+        help="claim each frame before it is rendered, so that several processes can share a range (with --no-overwrite); "
+        "the scene's choice if left out",
+    )
     render.add_argument("--view-layer", metavar="NAME", help="the view layer to render; the first one if left out")
     render.add_argument("--preview", action="store_true", help="write a PNG picture beside each file")
     render.add_argument(

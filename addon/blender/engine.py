@@ -12,7 +12,7 @@ from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
 from .preferences import backend_of, threads_of
-from .render_scene import RenderControl, RenderSettings, render_scene
+from .render_scene import Control, RenderSettings, read_scene
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 ENGINE = "MENISCUS"
@@ -80,13 +80,12 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             # Not the scene's own where the compositor of another scene asks.
             resolution=(self.resolution_x, self.resolution_y),
         )
-        image = render_scene(depsgraph, settings, RenderControl(self._set_frame, self.test_break, self._show_progress))
+        self._show_progress(0.0, "Reading the scene")
+        read = read_scene(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
+        image = read.image(Control(self.test_break, self._show_progress))
         if image.info.dropped_text:
             self.report({"WARNING"}, image.info.dropped_text)
         self._give(depsgraph, image, passes)
-
-    def _set_frame(self, frame: int, subframe: float) -> None:
-        self.frame_set(frame, subframe=subframe)
 
     def _show_progress(self, share: float, text: str) -> None:
         self.update_progress(share)

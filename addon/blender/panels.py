@@ -341,6 +341,7 @@ class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
         levels = column.column()
         levels.active = view_layer.use_pass_cryptomatte_object
         levels.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
+        self.layout.operator("meniscus.export_passes", icon="EXPORT")
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:

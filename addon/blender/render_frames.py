@@ -1,4 +1,8 @@
-"""Frames of a scene, rendered to files one after the other."""
+"""Frames of a scene, rendered to files one after the other: for the command line and the export.
+
+A frame is read on Blender's own thread, and rendered and written on any; its files are compressed and written by a process of
+their own while the next frame is rendered.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +10,32 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
+import numpy.typing as npt
 
-from ..fluid.errors import CancelledError, MeniscusError, OutputError
+from ..fluid.errors import CancelledError, FullDiskError, MeniscusError, OutputError
 from ..fluid.image import ImageBuffers, RenderInfo
-from ..output.exr_content import ExrOptions, flat_content
+from ..fluid.passes import PASSES
+from ..output.claims import claim, give_up, is_taken, remove_leftovers
+from ..output.exr_content import DEEP_COMPRESSIONS, ExrContent, ExrOptions, deep_content, flat_content
 from ..output.exr_process import ExrProcess
-from ..output.frame_path import frame_path
+from ..output.file_names import ended, frame_path, pass_pattern
 from ..output.whole_file import prepare_place
 from ..render.method import timed
 from .preview import write_png
-from .render_scene import RenderControl, RenderSettings, render_scene
+from .render_scene import Control, RenderSettings, SceneRender, read_scene
+
+LAYOUTS = {
+    "MULTILAYER": "One file a frame, all passes in one part: any program reads it",
+    "MULTIPART": "One file a frame, a part for each pass: programs read only what they need; Blender since 4.5",
+    "PASSES": "A file for each pass",
+}
+"""How passes are put into files."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +51,21 @@ class RenderJob:
     frames
         Frame numbers, in the order to render.
     output
-        Absolute path with ``####`` for the frame number.
+        Absolute path with ``####`` for the frame number, and ``{pass}`` where passes have files of their own.
     passes
         Names of those that are written.
+    layout
+        One of :data:`LAYOUTS`.
+    use_deep
+        Whether each frame gets a deep file beside the others.
     compression
         See :data:`exr_content.COMPRESSIONS`.
+    use_overwrite
+        Whether files that are there are written again; else their frames are left out.
+    use_placeholders
+        Whether a frame's files are claimed before it is rendered, so that several computers can share a range.
     use_preview
-        Whether each file gets a PNG picture beside it.
+        Whether each frame gets a PNG picture beside its file.
     """
 
     scene: bpy.types.Scene
@@ -50,8 +74,22 @@ class RenderJob:
     frames: tuple[int, ...]
     output: str
     passes: tuple[str, ...]
-    compression: str
-    use_preview: bool
+    layout: str = "MULTILAYER"
+    use_deep: bool = False
+    compression: str = "ZIP"
+    use_overwrite: bool = True
+    use_placeholders: bool = False
+    use_preview: bool = False
+
+    def paths(self, frame: int) -> dict[str, Path]:
+        """The files of a frame by what they hold: "flat", the name of a pass, or "deep"."""
+        if self.layout == "PASSES":
+            patterns = {name: pass_pattern(self.output, PASSES[name].blender_name) for name in self.passes}
+        else:
+            patterns = {"flat": pass_pattern(self.output, None)}
+        if self.use_deep:
+            patterns["deep"] = ended(pass_pattern(self.output, None), "deep")
+        return {content: frame_path(pattern, frame) for content, pattern in patterns.items()}
 
 
 @dataclass
@@ -60,118 +98,216 @@ class FrameReport:
 
     Attributes
     ----------
-    frame, path
-        Frame number and EXR file.
+    frame, paths
+        Frame number and files.
     info
         How the image came about; its milliseconds start with the scene's evaluation and end with the writing.
-    left_out
-        One sentence about unusable balls, empty where there were none.
+    note
+        One sentence about unusable balls or missing fluid, empty where there is nothing to say.
     error
-        One sentence, empty where the file (and the preview, if asked for) was written.
+        One sentence, empty where the files (and the preview, if asked for) were written.
+    was_there
+        Whether the files were there already, or another process has claimed them.
+    is_last
+        Whether the error holds for all frames to come: the disk is full.
     """
 
     frame: int
-    path: Path
+    paths: list[Path]
     info: RenderInfo = field(default_factory=RenderInfo)
-    left_out: str = ""
+    note: str = ""
     error: str = ""
+    was_there: bool = False
+    is_last: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        balls = self.info.counts.get("balls", 0)
-        return {"frame": self.frame, "path": str(self.path), "error": self.error, "balls": balls, **self.info.as_dict()}
+        named = {"frame": self.frame, "path": str(self.paths[0]), "paths": list(map(str, self.paths)), "error": self.error}
+        state = {"was_there": self.was_there, "note": self.note, "balls": self.info.counts.get("balls", 0)}
+        return {**named, **state, **self.info.as_dict()}
 
 
-@dataclass(frozen=True)
-class _Underway:
-    """A frame whose file is being written; None where there is nothing to write."""
+@dataclass
+class FrameWork:
+    """One frame on its way to its files: call :meth:`read`, then :meth:`render`, then :meth:`finish`.
 
+    Attributes
+    ----------
+    report
+        What becomes of it.
+    """
+
+    job: RenderJob
     report: FrameReport
-    writing: Future[float] | None
+    paths: dict[str, Path]
+    _read: SceneRender | None = None
+    _picture: npt.NDArray[np.float32] | None = None
+    _writing: list[Future[float]] = field(default_factory=list)
+    _failure: MeniscusError | None = None
+
+    @classmethod
+    def of(cls, job: RenderJob, frame: int) -> FrameWork:
+        """Nothing is done yet."""
+        paths = job.paths(frame)
+        return cls(job, FrameReport(frame, list(paths.values())), paths)
+
+    def take(self) -> bool:
+        """Claim the frame's files where that is asked for; False where there is nothing to do."""
+        job = self.job
+        for path in self.paths.values():
+            remove_leftovers(path)
+        if not job.use_overwrite and all(map(is_taken, self.paths.values())):
+            self.report.was_there = True
+        elif job.use_placeholders:
+            self.report.was_there = not all(claim(path) for path in self.paths.values() if not is_taken(path))
+        return not self.report.was_there
+
+    def read(self) -> None:
+        """Bring the scene to the frame and read it: on Blender's own thread."""
+        milliseconds: dict[str, float] = {}
+        with timed(milliseconds, "scene"):
+            self._set_frame(self.report.frame, 0.0)
+        self._read = read_scene(self.job.view_layer.depsgraph, self.job.settings, self._set_frame)
+        self._read.milliseconds.update({**milliseconds, **self._read.milliseconds})
+
+    def render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
+        """Render the frame and begin to write it, or keep the failure: on any thread."""
+        try:
+            self._render(writer, is_cancelled)
+        except MeniscusError as error:
+            self._failure = error
+
+    def check(self) -> None:
+        """Raise what rendering has failed with."""
+        if self._failure is not None:
+            raise self._failure
+
+    def _render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
+        assert self._read is not None
+        control, job = Control(is_cancelled), self.job
+        image = self._read.image(control)
+        self.report.info, self.report.note = image.info, _note(image)
+        if job.use_preview:
+            self._picture = image["combined"]
+        contents = [(name, self._flat(image, name)) for name in self.paths if name != "deep"]
+        if job.use_deep:
+            deep = self._read.deep_image(control)
+            image.info.milliseconds["spans"] = deep.info.milliseconds["spans"]
+            contents.append(("deep", deep_content(deep, self._options(_deep_compression(job.compression)))))
+        self._read = None
+        self._writing = [writer.write(self.paths[name], content) for name, content in contents]
 
     @property
     def is_finished(self) -> bool:
-        return self.writing is None or self.writing.done()
+        """Whether :meth:`finish` need not wait."""
+        return all(writing.done() for writing in self._writing)
 
-    def finished(self) -> FrameReport:
-        """The report, when the file is whole or has failed."""
-        if self.writing is not None:
-            try:
-                self.report.info.milliseconds["write"] = self.writing.result()
-            except OutputError as error:
-                self.report.error = str(error)
+    def finish(self) -> FrameReport:
+        """Wait until the files are whole or have failed, and write the preview: on Blender's own thread."""
+        try:
+            times = [writing.result() for writing in self._writing]
+            if times:
+                self.report.info.milliseconds["write"] = sum(times)
+            if self._picture is not None:
+                with timed(self.report.info.milliseconds, "preview"):
+                    write_png(self.report.paths[0].with_suffix(".png"), self._picture)
+        except OutputError as error:
+            self.fail(error)
         return self.report
 
+    def fail(self, error: MeniscusError) -> None:
+        """Note what went wrong, and leave the frame to others."""
+        self.report.error = str(error)
+        self.report.is_last = isinstance(error, FullDiskError)
+        for path in self.paths.values():
+            give_up(path)
 
-def render_frames(job: RenderJob, is_cancelled: Callable[[], bool] = lambda: False) -> Iterator[FrameReport]:
-    """Render the frames of `job` to files; a frame's report comes when its file is whole or has failed.
+    def _set_frame(self, frame: int, subframe: float) -> None:
+        self.job.scene.frame_set(frame, subframe=subframe)
+        self.job.view_layer.update()
 
-    A frame that fails does not stop the others. Only an error in the scene at the first frame does: the rest would fail alike.
+    def _flat(self, image: ImageBuffers, name: str) -> ExrContent:
+        job = self.job
+        passes = job.passes if name == "flat" else (name,)
+        # Mattes belong to the image of colours.
+        mattes = image.cryptomatte if name in ("flat", job.passes[0]) else None
+        written = replace(image, passes={key: image[key] for key in passes}, cryptomatte=mattes)
+        return flat_content(written, self._options(job.compression))
+
+    def _options(self, compression: str) -> ExrOptions:
+        job = self.job
+        return ExrOptions(
+            view_layer=job.view_layer.name,
+            compression=compression,
+            frame=self.report.frame,
+            frames_per_second=job.scene.render.fps / job.scene.render.fps_base,
+            is_multipart=job.layout == "MULTIPART",
+        )
+
+
+def render_frames(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[FrameReport]:
+    """Render all frames of a job; while one is written the next is rendered.
+
+    Yields
+    ------
+    FrameReport of each frame that was begun, in order, when its files are whole or it has failed. Where the disk is full no
+    more are begun.
 
     Raises
     ------
-    CancelledError
-        The user cancelled; the files that were begun are whole.
     MeniscusError
-        The first frame cannot be rendered, or nothing can be written to the output's folder.
+        The first frame that is rendered fails, or the render was cancelled. The files of frames that were begun are whole.
     """
-    prepare_place(frame_path(job.output, job.frames[0]))
-    underway: deque[_Underway] = deque()
+    for step in frame_steps(job, is_cancelled):
+        if isinstance(step, FrameReport):
+            yield step
+        else:
+            step()
+
+
+def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[FrameReport | Callable[[], None]]:
+    """As :func:`render_frames`, but gives the rendering of each frame to the caller, who may do it on another thread.
+
+    It is to be taken on Blender's own thread, and further only when the last function that it gave has been called.
+    """
+    prepare_place(next(iter(job.paths(job.frames[0]).values())))
+    underway: deque[FrameWork] = deque()
     with ExrProcess() as writer:
+        is_first = True
         for frame in job.frames:
+            work = FrameWork.of(job, frame)
+            underway.append(work)
             try:
-                underway.append(_begin_frame(job, frame, writer, is_cancelled))
-            except CancelledError:
-                yield from (begun.finished() for begun in underway)
+                if is_cancelled():
+                    raise CancelledError("The render was cancelled")
+                if work.take():
+                    work.read()
+                    yield partial(work.render, writer, is_cancelled)
+                    work.check()
+                    is_first = False
+            except CancelledError as error:
+                underway.pop().fail(error)
+                yield from (begun.finish() for begun in underway)
                 raise
             except MeniscusError as error:
-                if frame == job.frames[0]:
+                work.fail(error)
+                if is_first:
                     raise
-                underway.append(_Underway(FrameReport(frame, frame_path(job.output, frame), error=str(error)), None))
             while underway and underway[0].is_finished:
-                yield underway.popleft().finished()
-        yield from (begun.finished() for begun in underway)
+                report = underway.popleft().finish()
+                yield report
+                if report.is_last:
+                    yield from (begun.finish() for begun in underway)
+                    return
+        yield from (begun.finish() for begun in underway)
 
 
-def _begin_frame(job: RenderJob, frame: int, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> _Underway:
-    """Render one frame and begin to write it."""
-    if is_cancelled():
-        raise CancelledError("The render was cancelled")
-    report = FrameReport(frame, frame_path(job.output, frame))
-    image = _rendered(job, report, is_cancelled)
-    options = ExrOptions(
-        view_layer=job.view_layer.name,
-        compression=job.compression,
-        frame=frame,
-        frames_per_second=job.scene.render.fps / job.scene.render.fps_base,
-    )
-    written = replace(image, passes={name: image[name] for name in job.passes})
-    writing = writer.write(report.path, flat_content(written, options))
-    if job.use_preview:
-        _write_preview(image, report)
-    return _Underway(report, writing)
+def _note(image: ImageBuffers) -> str:
+    if image.info.counts.get("balls", 0) == 0:
+        return "There is no fluid in this frame: if there should be, check the simulation's cache"
+    return image.info.dropped_text
 
 
-def _rendered(job: RenderJob, report: FrameReport, is_cancelled: Callable[[], bool]) -> ImageBuffers:
-    milliseconds: dict[str, float] = {}
-    control = RenderControl(lambda frame, subframe: _set_frame(job, frame, subframe), is_cancelled)
-    with timed(milliseconds, "scene"):
-        _set_frame(job, report.frame, 0.0)
-    image = render_scene(job.view_layer.depsgraph, job.settings, control)
-    image.info.milliseconds = {**milliseconds, **image.info.milliseconds}
-    report.info = image.info
-    report.left_out = image.info.dropped_text
-    return image
-
-
-def _set_frame(job: RenderJob, frame: int, subframe: float) -> None:
-    job.scene.frame_set(frame, subframe=subframe)
-    job.view_layer.update()
-
-
-def _write_preview(image: ImageBuffers, report: FrameReport) -> None:
-    with timed(report.info.milliseconds, "preview"):
-        try:
-            write_png(report.path.with_suffix(".png"), image["combined"])
-        except OutputError as error:
-            report.error = str(error)
+def _deep_compression(compression: str) -> str:
+    """The nearest that OpenEXR has for deep images."""
+    return compression if compression in DEEP_COMPRESSIONS else "ZIPS"

@@ -1,16 +1,20 @@
-"""A view layer of a Blender scene, rendered whole: what the render engine and the command line both do."""
+"""A view layer of a Blender scene, rendered whole: what the render engine, the export and the command line all do.
+
+First everything is read, on Blender's own thread, which alone may touch the scene. Then it is rendered, on any thread.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import bpy
 
 from ..fluid.camera import Camera
 from ..fluid.cryptomatte import Coverage
+from ..fluid.deep_image import DeepImage
 from ..fluid.errors import CancelledError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
@@ -18,6 +22,7 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.meshes import Meshes
 from ..fluid.passes import PASSES
 from ..render.backdrop import backdrop
+from ..render.deep import render_deep
 from ..render.method import timed
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
@@ -30,6 +35,9 @@ from .read_scene import Fluid, read_field, read_fluid, read_look
 
 MOST_STEPS = 8
 """Points in time at which the scene is read for motion blur."""
+
+SetFrame = Callable[[int, float], None]
+"""Brings the dependency graph to a frame and a part of a frame."""
 
 
 @dataclass(frozen=True)
@@ -61,46 +69,37 @@ class RenderSettings:
     camera: bpy.types.Object | None = None
     resolution: tuple[int, int] | None = None
 
+    @property
+    def mean_passes(self) -> tuple[str, ...]:
+        """What is asked of each sample; the mattes count the objects that they see."""
+        names = tuple(name for name in self.passes if PASSES[name].is_antialiased)
+        return (*names, "object_index") if self.cryptomatte_levels else names
+
+    @property
+    def first_passes(self) -> tuple[str, ...]:
+        """What the rays through the centres of the pixels are asked for."""
+        return tuple(dict.fromkeys((*self.passes, *(("object_index",) if self.cryptomatte_levels else ()))))
+
 
 @dataclass(frozen=True)
-class RenderControl:
+class Control:
     """How a render and whoever asked for it speak to one another.
 
     Attributes
     ----------
-    set_frame
-        Brings the dependency graph to a frame and a part of a frame.
     is_cancelled
         Asked again and again; where it returns True, CancelledError is raised.
     on_progress
         Told the share that is done, 0 to 1, and what is being done.
     """
 
-    set_frame: Callable[[int, float], None]
     is_cancelled: Callable[[], bool]
     on_progress: Callable[[float, str], None] = lambda share, text: None
 
-
-def render_scene(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, control: RenderControl) -> ImageBuffers:
-    """Render a view layer at the frame that its dependency graph has, with the scene's own look.
-
-    Parameters
-    ----------
-    depsgraph
-        Evaluated dependency graph.
-    settings, control
-        How.
-
-    Returns
-    -------
-    ImageBuffers with the passes that were asked for; its report names the reading of the scene as the stage "read".
-
-    Raises
-    ------
-    InputError, DeviceError, CancelledError
-        Each with one sentence for the user.
-    """
-    return _SceneRender(depsgraph, settings, control).image()
+    def watch(self, _share: float) -> None:
+        """What native work calls."""
+        if self.is_cancelled():
+            raise CancelledError("The render was cancelled")
 
 
 @dataclass(frozen=True)
@@ -113,73 +112,171 @@ class _Moment:
     look: Look
     background: tuple[float, float, float, float]
     meshes: Meshes | None
+    are_holdouts: bool
 
     @property
     def object_names(self) -> tuple[str, ...]:
         others = self.meshes.objects if self.meshes is not None else ()
         return tuple(item.name for item in (*self.look.sources, *others))
 
+    def backdrop(self, camera: Camera, threads: int, control: Control) -> Backdrop | None:
+        """What else than fluid is seen; None where that is nothing."""
+        if self.meshes is None or not len(self.meshes):
+            return Backdrop.empty(camera.cropped(), self.background) if self.background[3] > 0 else None
+        lighting = self.look.lighting
+        return backdrop(
+            self.meshes, camera.cropped(), lighting, self.background, self.are_holdouts, threads=threads, watch=control.watch
+        )
 
-@dataclass
-class _SceneRender:
-    depsgraph: bpy.types.Depsgraph
+
+@dataclass(frozen=True)
+class SceneRender:
+    """A view layer at one frame, read and ready to be rendered on any thread. Made by :func:`read_scene`.
+
+    Attributes
+    ----------
+    settings
+        How it is rendered.
+    milliseconds
+        The time that reading took.
+    """
+
     settings: RenderSettings
-    control: RenderControl
-    milliseconds: dict[str, float] = field(default_factory=dict)
+    moment: _Moment
+    motion: Motion | None
+    shutter: tuple[_Moment, ...]
+    milliseconds: dict[str, float]
 
-    def image(self) -> ImageBuffers:
-        self.control.on_progress(0.0, "Reading the scene")
-        with timed(self.milliseconds, "read"):
-            moment, motion = self._moment(), self._motion()
-        image = self._shot(moment, moment.camera, self._first_passes, motion)
-        self._antialias(image, moment)
+    def image(self, control: Control) -> ImageBuffers:
+        """The passes; the report begins with the stage "read".
+
+        Raises
+        ------
+        InputError, DeviceError, CancelledError
+            Each with one sentence for the user.
+        """
+        image = self._shot(self.moment, self.moment.camera, self.settings.first_passes, control, self.motion)
+        self._antialias(image, control)
         image.info.milliseconds = {**self.milliseconds, **image.info.milliseconds}
         return image
+
+    def deep_image(self, control: Control) -> DeepImage:
+        """The fluid in depth, without motion blur; what hides it ends it. The errors are those of :meth:`image`."""
+        moment, settings = self.moment, self.settings
+        return render_deep(
+            moment.fluid.balls,
+            moment.camera,
+            moment.field,
+            method=settings.method,
+            backend=settings.backend,
+            look=moment.look,
+            is_cancelled=control.is_cancelled,
+            threads=settings.threads,
+            backdrop=moment.backdrop(moment.camera, settings.threads, control),
+        )
+
+    def _shot(
+        self, moment: _Moment, camera: Camera, passes: tuple[str, ...], control: Control, motion: Motion | None = None
+    ) -> ImageBuffers:
+        return render(
+            moment.fluid.balls,
+            camera,
+            moment.field,
+            method=self.settings.method,
+            backend=self.settings.backend,
+            passes=passes,
+            look=moment.look,
+            is_cancelled=control.is_cancelled,
+            threads=self.settings.threads,
+            backdrop=moment.backdrop(camera, self.settings.threads, control),
+            motion=motion,
+        )
+
+    def _antialias(self, image: ImageBuffers, control: Control) -> None:
+        """Replace the antialiased passes of an image by the means of samples."""
+        levels, names = self.settings.cryptomatte_levels, self.settings.mean_passes
+        mean = SampleMean(Coverage(levels) if levels else None)
+        if names and not self.shutter:
+            mean.add(image, self.moment.object_names)
+        with timed(image.info.milliseconds, "samples"):
+            for number, moment in self._further_samples():
+                control.on_progress(number / self.settings.samples, f"Sample {number + 1} of {self.settings.samples}")
+                mean.add(self._shot(moment, moment.camera.shifted(*sample_offset(number)), names, control), moment.object_names)
+        mean.put_into(image)
+
+    def _further_samples(self) -> Iterator[tuple[int, _Moment]]:
+        """Numbers of the samples that are still to be rendered, and what they see."""
+        if not self.settings.mean_passes:
+            return
+        if not self.shutter:
+            yield from ((number, self.moment) for number in range(1, self.settings.samples))
+            return
+        for step, moment in enumerate(self.shutter):
+            yield from ((number, moment) for number in range(step, self.settings.samples, len(self.shutter)))
+
+
+def read_scene(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, set_frame: SetFrame) -> SceneRender:
+    """Read a view layer at the frame that its dependency graph has, with the scene's own look.
+
+    Motion blur and the motion of the camera take the dependency graph to other times, and back.
+
+    Raises
+    ------
+    InputError
+        One sentence for the user.
+    """
+    milliseconds: dict[str, float] = {}
+    with timed(milliseconds, "read"):
+        reader = _Reader(depsgraph, settings, set_frame)
+        moment = reader.moment()
+        return SceneRender(settings, moment, reader.motion(), reader.shutter(), milliseconds)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    depsgraph: bpy.types.Depsgraph
+    settings: RenderSettings
+    set_frame: SetFrame
 
     @property
     def _scene(self) -> bpy.types.Scene:
         return self.depsgraph.scene_eval  # animated settings reach only this one
 
-    @property
-    def _has_blur(self) -> bool:
-        return self._scene.render.use_motion_blur and self._scene.render.motion_blur_shutter > 0 and bool(self._mean_passes)
-
-    @property
-    def _mean_passes(self) -> tuple[str, ...]:
-        """What is asked of each sample; the mattes count the objects that they see."""
-        names = tuple(name for name in self.settings.passes if PASSES[name].is_antialiased)
-        return (*names, "object_index") if self.settings.cryptomatte_levels else names
-
-    @property
-    def _first_passes(self) -> tuple[str, ...]:
-        """What the rays through the centres of the pixels are asked for."""
-        names = dict.fromkeys(self.settings.passes)
-        if self.settings.cryptomatte_levels:
-            names["object_index"] = None
-        return tuple(names)
-
-    def _moment(self) -> _Moment:
-        scene = self._scene
-        look = read_look(scene, scene.meniscus.render_style)
+    def moment(self) -> _Moment:
+        """What there is to be seen now."""
+        scene, settings = self._scene, self._scene.meniscus
+        look = read_look(scene, settings.render_style)
         fluid = read_fluid(self.depsgraph, uses_materials=LOOK_STYLES[look.style].uses_scene)
         lighting = read_lighting(self.depsgraph)
         is_clear = scene.render.film_transparent or not self.depsgraph.view_layer.use_sky
         return _Moment(
-            camera=read_camera(self.depsgraph, self.settings.camera, self.settings.resolution),
+            camera=self._camera(),
             fluid=fluid,
             field=read_field(scene),
             look=replace(look, sources=fluid.sources, lighting=lighting),
             background=(0.0, 0.0, 0.0, 0.0) if is_clear else (*lighting.world, 1.0),
-            meshes=read_meshes(self.depsgraph) if scene.meniscus.render_meshes != "NONE" else None,
+            meshes=read_meshes(self.depsgraph) if settings.render_meshes != "NONE" else None,
+            are_holdouts=settings.render_meshes == "HOLDOUT",
         )
 
-    def _motion(self) -> Motion | None:
+    def motion(self) -> Motion | None:
         """The camera's from frame to frame, for those who ask for it."""
         if "vector" not in self.settings.passes:
             return None
         render = self._scene.render
-        previous, following = (self._camera_at(step) for step in (-1, 1)) if self._camera_moves else (self._camera_at(0),) * 2
-        return Motion(previous, following, render.fps_base / render.fps)
+        steps = (-1, 1) if self._camera_moves else (0, 0)
+        return Motion(*map(self._camera_at, steps), render.fps_base / render.fps)
+
+    def shutter(self) -> tuple[_Moment, ...]:
+        """What is seen while the shutter is open; nothing without motion blur."""
+        render = self._scene.render
+        if not (render.use_motion_blur and render.motion_blur_shutter > 0 and self.settings.mean_passes):
+            return ()
+        steps = min(self.settings.samples, MOST_STEPS)
+        start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
+        times = [(start + (step + 0.5) / steps) * render.motion_blur_shutter for step in range(steps)]
+        with self._other_times() as set_time:
+            return tuple(self._moment_at(time, set_time) for time in times)
 
     @property
     def _camera_moves(self) -> bool:
@@ -189,87 +286,30 @@ class _SceneRender:
             camera.animation_data or camera.parent or camera.constraints or camera.data.animation_data
         )
 
-    def _camera_at(self, step: float) -> Camera:
+    def _camera(self) -> Camera:
+        return read_camera(self.depsgraph, self.settings.camera, self.settings.resolution)
+
+    def _camera_at(self, step: int) -> Camera:
         if step == 0:
-            return read_camera(self.depsgraph, self.settings.camera, self.settings.resolution)
-        with self._another_time(step):
-            return self._camera_at(0)
+            return self._camera()
+        with self._other_times() as set_time:
+            set_time(step)
+            return self._camera()
+
+    def _moment_at(self, step: float, set_time: Callable[[float], None]) -> _Moment:
+        set_time(step)
+        return self.moment()
 
     @contextmanager
-    def _another_time(self, step: float) -> Iterator[None]:
-        """Have the dependency graph show a time so many frames later."""
+    def _other_times(self) -> Iterator[Callable[[float], None]]:
+        """Gives a function that brings the dependency graph so many frames from now; in the end it is brought back."""
         now = self._scene.frame_current + self._scene.frame_subframe
-        self._set_time(now + step)
+
+        def set_time(step: float) -> None:
+            frame = math.floor(now + step)
+            self.set_frame(frame, now + step - frame)
+
         try:
-            yield
+            yield set_time
         finally:
-            self._set_time(now)
-
-    def _set_time(self, time: float) -> None:
-        frame = math.floor(time)
-        self.control.set_frame(frame, time - frame)
-
-    def _backdrop(self, moment: _Moment, camera: Camera) -> Backdrop | None:
-        """What else than fluid is seen; None where that is nothing."""
-        if moment.meshes is None or not len(moment.meshes):
-            return Backdrop.empty(camera.cropped(), moment.background) if moment.background[3] > 0 else None
-        return backdrop(
-            moment.meshes,
-            camera.cropped(),
-            moment.look.lighting,
-            moment.background,
-            are_holdouts=self._scene.meniscus.render_meshes == "HOLDOUT",
-            threads=self.settings.threads,
-            watch=self._watch,
-        )
-
-    def _watch(self, _share: float) -> None:
-        if self.control.is_cancelled():
-            raise CancelledError("The render was cancelled")
-
-    def _shot(self, moment: _Moment, camera: Camera, passes: tuple[str, ...], motion: Motion | None = None) -> ImageBuffers:
-        return render(
-            moment.fluid.balls,
-            camera,
-            moment.field,
-            method=self.settings.method,
-            backend=self.settings.backend,
-            passes=passes,
-            look=moment.look,
-            is_cancelled=self.control.is_cancelled,
-            threads=self.settings.threads,
-            backdrop=self._backdrop(moment, camera),
-            motion=motion,
-        )
-
-    def _antialias(self, image: ImageBuffers, moment: _Moment) -> None:
-        """Replace the antialiased passes of an image by the means of samples."""
-        levels = self.settings.cryptomatte_levels
-        mean = SampleMean(Coverage(levels) if levels else None)
-        if self._mean_passes and not self._has_blur:
-            mean.add(image, moment.object_names)
-        with timed(self.milliseconds, "samples"):
-            for number, now in self._further_samples(moment):
-                self.control.on_progress(number / self.settings.samples, f"Sample {number + 1} of {self.settings.samples}")
-                shot = self._shot(now, now.camera.shifted(*sample_offset(number)), self._mean_passes)
-                mean.add(shot, now.object_names)
-        mean.put_into(image)
-
-    def _further_samples(self, moment: _Moment) -> Iterator[tuple[int, _Moment]]:
-        """Numbers of the samples that are still to be rendered, and what they see."""
-        if not self._mean_passes:
-            return
-        if not self._has_blur:
-            yield from ((number, moment) for number in range(1, self.settings.samples))
-            return
-        steps = min(self.settings.samples, MOST_STEPS)
-        for step in range(steps):
-            with self._another_time(self._shutter_time((step + 0.5) / steps)):
-                now = self._moment()
-            yield from ((number, now) for number in range(step, self.settings.samples, steps))
-
-    def _shutter_time(self, share: float) -> float:
-        """Frames from the present one to a share of the time that the shutter is open."""
-        render = self._scene.render
-        start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
-        return float((start + share) * render.motion_blur_shutter)
+            set_time(0.0)

@@ -17,5 +17,9 @@ class OutputError(MeniscusError):
     """A file cannot be written or read."""
 
 
+class FullDiskError(OutputError):
+    """There is no room for a file, nor for those after it."""
+
+
 class CancelledError(MeniscusError):
     """The user cancelled the work."""

@@ -1,7 +1,7 @@
 """What runs in the child process of :mod:`exr_process`: takes file contents from a pipe and writes them.
 
 A request is one line of JSON (path and, by part, attributes and, by array, name, type and shape), then the arrays' bytes in
-the same order. The answer is one line of JSON: the error's sentence, empty where all went well.
+the same order. The answer is one line of JSON: the error's kind and sentence, empty where all went well.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..fluid.errors import MeniscusError
+from ..fluid.errors import FullDiskError, MeniscusError, OutputError
 from .exr import write_content
 from .exr_content import ExrContent, ExrPart
 
@@ -40,10 +40,21 @@ def _arrays(part: ExrPart) -> list[tuple[str | None, npt.NDArray[Any]]]:
     return [*part.channels.items(), *counts]
 
 
-def read_answer(stream: IO[bytes]) -> str | None:
-    """The parent's side: the error's sentence, empty where all went well; None if the child has ended."""
+def read_answer(stream: IO[bytes]) -> bool:
+    """The parent's side: wait until the file is whole; False if the child has ended instead.
+
+    Raises
+    ------
+    OutputError
+        What the child could not do.
+    """
     line = stream.readline()
-    return json.loads(line) if line.endswith(b"\n") else None
+    if not line.endswith(b"\n"):
+        return False
+    kind, sentence = json.loads(line)
+    if kind:
+        raise (FullDiskError if kind == FullDiskError.__name__ else OutputError)(sentence)
+    return True
 
 
 def serve() -> None:
@@ -66,14 +77,14 @@ def _private_stdout() -> BufferedWriter:
     return answers
 
 
-def _answer(requests: BufferedReader, head_line: bytes) -> str:
+def _answer(requests: BufferedReader, head_line: bytes) -> tuple[str, str]:
     head = json.loads(head_line)
     parts = [_read_part(requests, part) for part in head["parts"]]
     try:
         write_content(head["path"], ExrContent(tuple(parts)))
     except MeniscusError as error:
-        return str(error)
-    return ""
+        return type(error).__name__, str(error)
+    return "", ""
 
 
 def _read_part(requests: BufferedReader, head: dict[str, Any]) -> ExrPart:

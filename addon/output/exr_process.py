@@ -84,12 +84,9 @@ class ExrProcess:
         """Runs in the worker thread, which alone talks to the child."""
         start = time.perf_counter()
         child = self._child = self._child or _Child()
-        error = child.write(path, content)
-        if error is None:
+        if not child.write(path, content):
             self._child = None
             raise child.lost(path)
-        if error:
-            raise OutputError(error)
         return (time.perf_counter() - start) * 1e3
 
 
@@ -110,13 +107,13 @@ class _Child:
         self._requests = cast(IO[bytes], self._process.stdin)
         self._answers = cast(IO[bytes], self._process.stdout)
 
-    def write(self, path: Path, content: ExrContent) -> str | None:
-        """The error's sentence, empty where all went well; None if the process has ended."""
+    def write(self, path: Path, content: ExrContent) -> bool:
+        """Write a file; False if the process has ended. OutputError says what it could not do."""
         try:
             send_request(self._requests, str(path), content)
             return read_answer(self._answers)
         except OSError:
-            return None
+            return False
 
     def lost(self, path: Path) -> OutputError:
         """Clear up after the process ended while it had `path` to write, and say so."""

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import errno
 import os
+import re
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..fluid.errors import OutputError
+from ..fluid.errors import FullDiskError, OutputError
 
 _FULL_DISK = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 
 def temporary_path(path: Path, process_id: int) -> Path:
-    """The name that `path` has while the process writes it: hidden, in the same folder, with the same extension."""
-    return path.with_name(f".{path.stem}.{process_id}.tmp{path.suffix}")
+    """The name that `path` has while a process of this computer writes it: hidden, beside it, with the same extension."""
+    return path.with_name(f".{path.stem}.{this_host()}.{process_id}.tmp{path.suffix}")
+
+
+def this_host() -> str:
+    """The computer's name, as part of file names."""
+    return re.sub(r"\W", "-", socket.gethostname())
 
 
 @contextmanager
@@ -57,7 +64,7 @@ def prepare_place(path: Path) -> None:
 def _write_error(path: Path, error: OSError) -> OutputError:
     """What the user is told when writing `path` fails."""
     if error.errno in _FULL_DISK:
-        return OutputError(f"Cannot write {path}: the disk is full; free some space or choose another folder")
+        return FullDiskError(f"Cannot write {path}: the disk is full; free some space or choose another folder")
     return OutputError(f"Cannot write {path}: {_reason(error)}; check the permissions or choose another folder")
 
 

@@ -3,6 +3,7 @@
 import importlib
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -328,12 +329,12 @@ def test_a_full_disk_keeps_the_old_files_and_fails_the_command(fluid_scene: bpy.
     # A limit on the size of files makes the system refuse the write in the middle, as a full disk does.
     resource.setrlimit(resource.RLIMIT_FSIZE, (8000, hard))
     try:
-        result = run("render", "--output", "//####.exr", "--frames", "1:2", "--compression", "NONE")
+        result = run("render", "--output", "//####.exr", "--frames", "1:2,4:9", "--compression", "NONE")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert result.status == 1
-    assert result.err.count("the disk is full; free some space or choose another folder\n") == 2
-    assert result.out == "Meniscus wrote 0 of 2 frames; 2 failed\n"
+    assert 1 <= result.err.count("the disk is full; free some space or choose another folder\n") <= 4
+    assert re.fullmatch(r"Meniscus wrote 0 of 8 frames; \d failed; \d were not rendered\n", result.out)
     assert names_in(tmp_path) == before
     assert (tmp_path / "0001.exr").read_bytes() == b"old"
 
@@ -345,7 +346,7 @@ def test_a_killed_child_costs_one_frame_and_no_old_file(
     child = submodule(meniscus, "output.exr_process")._Child
     write = child.write
 
-    def write_to_killed(self: object, path: Path, content: object) -> str | None:
+    def write_to_killed(self: object, path: Path, content: object) -> bool:
         if path.name == "0002.exr":
             self._process.kill()
             self._process.wait()

@@ -155,9 +155,9 @@ def test_ctrl_c_does_not_stop_the_child(tmp_path: Path) -> None:
 def test_at_most_two_images_are_under_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on, third_was_taken = threading.Event(), threading.Event()
 
-    def blocked_write(*_: object) -> str:
+    def blocked_write(*_: object) -> bool:
         go_on.wait()
-        return ""
+        return True
 
     monkeypatch.setattr(exr_process._Child, "write", blocked_write)
     with ExrProcess() as writer:

@@ -1,0 +1,215 @@
+"""Exports the passes of a view layer to OpenEXR files while the user may watch, or go on."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from threading import Event
+from typing import ClassVar
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, StringProperty
+
+from ..fluid.errors import CancelledError, MeniscusError
+from ..output.exr_content import COMPRESSIONS
+from .output_pattern import output_pattern
+from .preferences import backend_of, threads_of
+from .render_frames import LAYOUTS, FrameReport, RenderJob, frame_steps
+from .render_scene import RenderSettings
+from .sources import has_sources
+from .view_layer_passes import cryptomatte_levels, wanted_passes
+
+_TICK = 0.02
+"""Seconds between two looks at what the thread does and whether the user gave up."""
+
+Result = set[str]
+
+
+class MENISCUS_OT_export_passes(bpy.types.Operator):
+    """Render the passes that the view layer asks for to OpenEXR files; overwriting and placeholders are those of the output"""
+
+    bl_idname = "meniscus.export_passes"
+    bl_label = "Export Fluid Passes"
+    bl_options: ClassVar[set[str]] = {"REGISTER"}
+
+    filepath: StringProperty(
+        name="File", description="Where to write; #### is the frame number, {pass} the name of a pass", subtype="FILE_PATH"
+    )
+    filter_glob: StringProperty(default="*.exr", options={"HIDDEN"})
+    use_animation: BoolProperty(
+        name="Animation", description="Export all frames of the scene's range, else the present one", default=True
+    )
+    layout: EnumProperty(
+        name="Layout",
+        description="How passes are put into files",
+        items=[
+            (name, label, LAYOUTS[name]) for name, label in zip(LAYOUTS, ("Multilayer", "Multi-Part", "Files"), strict=True)
+        ],
+    )
+    use_deep: BoolProperty(
+        name="Deep", description="Also write a deep file, which can be merged with smoke and solids inside the fluid"
+    )
+    compression: EnumProperty(
+        name="Compression",
+        description="All lossless",
+        items=[(name, name.title(), text) for name, text in COMPRESSIONS.items()],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not has_sources(context.scene):
+            cls.poll_message_set("The scene has no fluid: use an object as fluid first")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Result:
+        if not self.filepath:
+            self.filepath = f"{Path(bpy.data.filepath).stem or 'fluid'}_####.exr"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> Result:
+        try:
+            job = self._job(context)
+            self._run = _Run(job)
+            if bpy.app.background:
+                self._run.to_the_end()
+                return self._finish(context)
+        except MeniscusError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        manager = context.window_manager
+        manager.progress_begin(0, len(job.frames))
+        self._timer = manager.event_timer_add(_TICK, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Result:
+        if event.type == "ESC" and event.value == "PRESS":
+            self._run.cancel()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if not self._run.advance():
+            return self._finish(context)
+        context.window_manager.progress_update(len(self._run.reports))
+        context.workspace.status_text_set(f"{self._run.progress_text}   Esc: cancel")
+        return {"PASS_THROUGH"}
+
+    def _finish(self, context: bpy.types.Context) -> Result:
+        if not bpy.app.background:
+            context.window_manager.event_timer_remove(self._timer)
+            context.window_manager.progress_end()
+            context.workspace.status_text_set(None)
+        self._run.close()
+        kind, sentence = self._run.outcome
+        self.report({kind}, sentence)
+        return {"CANCELLED"} if kind == "ERROR" else {"FINISHED"}
+
+    def _job(self, context: bpy.types.Context) -> RenderJob:
+        scene, view_layer = context.scene, context.view_layer
+        passes = tuple(image_pass.name for image_pass in wanted_passes(view_layer))
+        settings = RenderSettings(
+            passes=passes,
+            cryptomatte_levels=cryptomatte_levels(view_layer),
+            samples=scene.meniscus.render_samples,
+            method=scene.meniscus.method,
+            backend=backend_of(scene),
+            threads=threads_of(scene),
+        )
+        whole = tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+        frames = whole if self.use_animation else (scene.frame_current,)
+        return RenderJob(
+            scene=scene,
+            view_layer=view_layer,
+            settings=settings,
+            frames=frames,
+            output=output_pattern(self.filepath, scene, view_layer, settings, len(frames)),
+            passes=passes,
+            layout=self.layout,
+            use_deep=self.use_deep,
+            compression=self.compression,
+            use_overwrite=scene.render.use_overwrite,
+            use_placeholders=scene.render.use_placeholder,
+        )
+
+
+class _Run:
+    """A job on its way: reads on this thread and renders on another."""
+
+    def __init__(self, job: RenderJob) -> None:
+        self._job, self._cancelled = job, Event()
+        self._steps = frame_steps(job, self._cancelled.is_set)
+        self._thread = ThreadPoolExecutor(1, "meniscus-export")
+        self._rendering: Future[None] | None = None
+        self._failure: MeniscusError | None = None
+        self._frame = job.scene.frame_current
+        self.reports: list[FrameReport] = []
+
+    def cancel(self) -> None:
+        """Give up; the files of frames that were begun become whole."""
+        self._cancelled.set()
+
+    def advance(self) -> bool:
+        """Go on where that does not keep Blender waiting for long; False when all is done."""
+        if self._rendering is not None and not self._rendering.done():
+            return True
+        try:
+            step = next(self._steps)
+        except StopIteration:
+            return False
+        except MeniscusError as error:
+            self._failure = error
+            return False
+        if isinstance(step, FrameReport):
+            self.reports.append(step)
+        else:
+            self._rendering = self._thread.submit(step)
+        return True
+
+    def to_the_end(self) -> None:
+        """Go on until all is done."""
+        while self.advance():
+            if self._rendering is not None:
+                self._rendering.result()
+
+    def close(self) -> None:
+        """End the thread, and bring the scene back to the frame that it had."""
+        self._thread.shutdown()
+        self._job.scene.frame_set(self._frame)
+
+    @property
+    def progress_text(self) -> str:
+        """How far it is."""
+        return f"Meniscus exports: {len(self.reports)} of {len(self._job.frames)} frames written"
+
+    @property
+    def outcome(self) -> tuple[str, str]:
+        """Kind and sentence of what to tell the user in the end."""
+        there = sum(report.was_there for report in self.reports)
+        errors = [report.error for report in self.reports if report.error]
+        written = len(self.reports) - there - len(errors)
+        sentence = f"Meniscus wrote {written} of {len(self._job.frames)} frames"
+        sentence += f"; {there} were there or claimed" if there else ""
+        if isinstance(self._failure, CancelledError):
+            return "WARNING", f"Cancelled: {sentence}"
+        if self._failure is not None or errors:
+            return "ERROR", f"{self._failure or errors[0]} ({sentence})"
+        notes = [report.note for report in self.reports if report.note]
+        return ("WARNING", f"{sentence}; {notes[0]}") if notes else ("INFO", sentence)
+
+
+def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(MENISCUS_OT_export_passes.bl_idname, text="Fluid Passes (.exr)")
+
+
+def register() -> None:
+    """Offer the export."""
+    bpy.utils.register_class(MENISCUS_OT_export_passes)
+    bpy.types.TOPBAR_MT_file_export.append(_draw_menu)
+
+
+def unregister() -> None:
+    """Take the export away."""
+    bpy.types.TOPBAR_MT_file_export.remove(_draw_menu)
+    bpy.utils.unregister_class(MENISCUS_OT_export_passes)
