@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..fluid.errors import InputError
-from .engine import ENGINE
+from .engine_name import ENGINE
 
 MERGES = (
     (

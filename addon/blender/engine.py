@@ -5,17 +5,22 @@ from __future__ import annotations
 import traceback
 
 import bpy
+import gpu
 import numpy as np
 
 from ..fluid.cryptomatte import LAYER
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
+from .engine_name import ENGINE
 from .preferences import backend_of, threads_of
+from .read_materials import read_lighting
+from .read_meshes import read_meshes
 from .render_scene import Control, RenderSettings, read_scene
+from .rendered_view import RenderedMeshes, view_matrices
 from .view_layer_passes import cryptomatte_levels, wanted_passes
-
-ENGINE = "MENISCUS"
+from .viewport import draw_in_engine
+from .viewport_status import STATUS
 
 _MATTE_CHANNELS = "rgba"
 """As Cycles names them, so that they are not taken for colours."""
@@ -49,6 +54,31 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, _name_of(image_pass), count, image_pass.channels, kind)
         for name in _matte_names(renderlayer):
             self.register_pass(scene, renderlayer, name, 4, _MATTE_CHANNELS, "COLOR")
+
+    def view_update(self, _context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Something in the scene of a Rendered viewport has changed."""
+        self._shown: RenderedMeshes | None = None
+        self._world = read_lighting(depsgraph).world
+
+    def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        """Draw a Rendered viewport, scene-linear. Nothing may leave it: Blender would print it each time."""
+        try:
+            with view_matrices(context.region_data):
+                self._draw_surroundings(context, depsgraph)
+                draw_in_engine(context)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the user sees it
+            STATUS.report(f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
+
+    def _draw_surroundings(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
+        scene = depsgraph.scene
+        if not scene.render.film_transparent:
+            gpu.state.active_framebuffer_get().clear(color=(*self._world, 1.0))
+        if scene.meniscus.render_meshes == "NONE":
+            return
+        if self._shown is None:
+            space = context.space_data
+            self._shown = RenderedMeshes(read_meshes(depsgraph, viewport=space), read_lighting(depsgraph, space))
+        self._shown.draw(are_holdouts=scene.meniscus.render_meshes == "HOLDOUT")
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Render a view layer. Nothing may leave it: Blender would stop without a word to the user."""

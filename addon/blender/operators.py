@@ -11,7 +11,7 @@ from bpy.props import EnumProperty
 from ... import __version__
 from ..fluid.errors import MeniscusError
 from .compositing import MERGES, add_compositing, fluid_scene_of
-from .engine import ENGINE
+from .engine_name import ENGINE
 from .presets import PRESETS, apply_preset
 from .sources import active_source, has_sources, problem_of, use_as_fluid, use_no_more
 from .viewport_status import STATUS

@@ -13,7 +13,7 @@ from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
 from ..fluid.passes import PASSES
 from .compositing import fluid_scene_of
-from .engine import ENGINE
+from .engine_name import ENGINE
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
 from .texture_sharing import SHARING

@@ -22,7 +22,7 @@ from .view_transform import TABLE_SIZE, DisplayTransform
 
 FloatArray = npt.NDArray[np.float64]
 
-_UNCHANGED = DisplayTransform()
+UNCHANGED = DisplayTransform()
 """For colours that stand for numbers."""
 
 _CORNERS = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
@@ -85,7 +85,7 @@ class Presenter:
         Blender's state of drawing is left as it was found.
         """
         if LOOK_STYLES[look.style].is_data:
-            transform = _UNCHANGED
+            transform = UNCHANGED
         before = _State()
         try:
             self._take(pictures)

@@ -231,6 +231,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         description="How the surface is coloured in renders",
         items=stable_items((style.name, style.label, style.description) for style in LOOK_STYLES.values()),
         default="material",
+        update=note_display,
     )
     render_meshes: EnumProperty(
         name="Meshes",
@@ -246,6 +247,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
             ("NONE", "Hidden", "Neither seen nor hiding fluid", 2),
         ),
         default="SHADED",
+        update=note_display,
     )
     color: FloatVectorProperty(
         name="Color",

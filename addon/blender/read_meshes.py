@@ -12,30 +12,34 @@ import numpy.typing as npt
 from ..fluid.lighting import Material
 from ..fluid.meshes import Meshes, MeshObject
 from .read_materials import read_material
-from .visible_sources import settings_of, shown_in_render
+from .visible_sources import ShownTest, settings_of, shown_in_render, shown_in_viewport
 
 _WITH_SURFACE = {"CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have a surface but no mesh."""
 
 
-def read_meshes(depsgraph: bpy.types.Depsgraph) -> Meshes:
+def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None = None) -> Meshes:
     """All surfaces of a view layer that are not fluid, at its current frame, instances too.
 
     Parameters
     ----------
     depsgraph
         Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
+    viewport
+        The viewport whose visibility counts; None for that of renders.
     """
     collected = _Collected(depsgraph.view_layer)
     if depsgraph.view_layer.use_solid:
-        for instance in _shown_instances(depsgraph):
+        for instance in _shown_instances(depsgraph, viewport):
             collected.add(instance)
     return collected.meshes()
 
 
-def _shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+def _shown_instances(
+    depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None
+) -> Iterator[bpy.types.DepsgraphObjectInstance]:
     """What there is to be seen; each is valid only until the next one is taken."""
-    is_shown = shown_in_render(depsgraph)
+    is_shown = shown_in_render(depsgraph) if viewport is None else _shown_solid(depsgraph, viewport)
     for instance in depsgraph.object_instances:
         item = instance.instance_object if instance.is_instance else instance.object
         owner = instance.parent if instance.is_instance else item
@@ -43,6 +47,12 @@ def _shown_instances(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Depsg
             view_layer = depsgraph.view_layer
             if item.visible_camera and not owner.original.indirect_only_get(view_layer=view_layer):
                 yield instance
+
+
+def _shown_solid(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D) -> ShownTest:
+    """Whether a viewport shows an object that a render shows too, and not as wires."""
+    is_shown = shown_in_viewport(depsgraph, viewport)
+    return lambda item, owner: is_shown(item, owner) and not item.hide_render and item.display_type in {"SOLID", "TEXTURED"}
 
 
 def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:

@@ -23,9 +23,10 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..render.live_view import LiveRenderer, LiveView, View
 from ..render.method import timed
 from .changes import CHANGES
+from .engine_name import is_engine_view
 from .legend import draw_legend
 from .preferences import backend_of, preferences
-from .presenter import Place, Presenter
+from .presenter import UNCHANGED, Place, Presenter
 from .read_materials import read_lighting
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
@@ -116,8 +117,12 @@ class ViewportDrawing:
 
     def _draw(self) -> None:
         """Blender's draw handler for what is in the scene."""
+        if not is_engine_view(bpy.context):
+            self.draw(bpy.context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the fluid into the viewport that Blender is drawing, with the matrices of its view."""
         started = time.monotonic()
-        context = bpy.context
         self._release_dropped()
         key = context.region.as_pointer()
         self._legends.pop(key, None)
@@ -154,7 +159,7 @@ class ViewportDrawing:
         STATUS.report(problem, details)
 
     def _draw_fluid(self, context: bpy.types.Context, key: int, started: float) -> None:
-        look = read_look(context.scene, context.scene.meniscus.style)
+        look = read_look(context.scene, _style(context))
         uses_scene = LOOK_STYLES[look.style].uses_scene
         depsgraph = context.view_layer.depsgraph
         fluid = self._scene_balls.fluid(depsgraph, context.space_data, uses_scene)
@@ -200,7 +205,10 @@ class ViewportDrawing:
         place = Place(seen.projection, seen.offset_of(shown), seen.rectangle_of(shown.window), _has_depth(space))
         milliseconds: dict[str, float] = {}
         with timed(milliseconds, "present"):
-            viewport.presenter.draw(pictures, look, self._transforms.of(context.scene, space.shading), place)
+            # What the engine draws is scene-linear; Blender transforms it.
+            is_linear = is_engine_view(context)
+            transform = UNCHANGED if is_linear else self._transforms.of(context.scene, space.shading)
+            viewport.presenter.draw(pictures, look, transform, place)
         if is_new:
             viewport.live.note_presenting(pictures[-1], milliseconds["present"] / 1e3)
 
@@ -239,6 +247,12 @@ class ViewportDrawing:
         self._dropped.clear()
 
 
+def _style(context: bpy.types.Context) -> str:
+    """The look that a viewport has: that of renders where it shows what the render engine would."""
+    settings = context.scene.meniscus
+    return str(settings.render_style if is_engine_view(context) else settings.style)
+
+
 def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
     settings, chosen, style = scene.meniscus, preferences(), LOOK_STYLES[look.style]
     return View(
@@ -270,7 +284,7 @@ def _passes(look: Look, balls: Balls) -> tuple[str, ...]:
 
 def _has_depth(space: bpy.types.SpaceView3D) -> bool:
     """Whether Blender has the depth of its meshes: up to 4.3 EEVEE leaves it out where overlays are off."""
-    if space.overlay.show_overlays or space.shading.type not in ("MATERIAL", "RENDERED"):
+    if is_engine_view(bpy.context) or space.overlay.show_overlays or space.shading.type not in ("MATERIAL", "RENDERED"):
         return True
     framebuffer = gpu.state.active_framebuffer_get()
     x, y, width, height = framebuffer.viewport_get()
@@ -291,6 +305,12 @@ def _redraw_sidebar(area: bpy.types.Area) -> None:
 
 
 _drawing: ViewportDrawing | None = None
+
+
+def draw_in_engine(context: bpy.types.Context) -> None:
+    """Draw the fluid where the render engine draws a viewport."""
+    if _drawing is not None:
+        _drawing.draw(context)
 
 
 @persistent

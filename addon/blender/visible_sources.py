@@ -93,13 +93,14 @@ def visible_sources(
         raise NoSourceError(
             "No object supplies balls: enable Meniscus in the object properties of one with particles or points"
         )
-    is_shown = _shown_in_viewport(depsgraph, space) if viewport else shown_in_render(depsgraph)
+    is_shown = shown_in_viewport(depsgraph, space) if viewport else shown_in_render(depsgraph)
     for source, owner in _places(depsgraph, fluid):
         if is_shown(source.object, owner):
             yield source
 
 
-def _shown_in_viewport(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None) -> ShownTest:
+def shown_in_viewport(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None) -> ShownTest:
+    """Whether a viewport shows an object; without one the view layer decides."""
     # The dependency graph also holds the objects of hidden collections, because a viewport may have its own choice of them.
     return lambda item, owner: owner.original.visible_get(view_layer=depsgraph.view_layer, viewport=space)
 

@@ -201,3 +201,13 @@ def test_the_operator_says_what_is_wrong(scene, tmp_path):
 def test_one_frame_keeps_its_name(scene, tmp_path):
     assert bpy.ops.meniscus.export_passes(filepath=str(tmp_path / "still.exr"), use_animation=False) == {"FINISHED"}
     assert names(tmp_path) == ["still.exr"]
+
+
+@pytest.mark.skipif(not bpy.app.binary_path, reason="only the real program can be started")
+def test_the_farm_example_splits_a_range_over_processes(scene, meniscus, tmp_path):
+    farm = importlib.import_module(f"{meniscus.__name__}.samples.farm")
+    scene.frame_end = 4
+    bpy.ops.wm.save_mainfile()
+    arguments = ["--blender", bpy.app.binary_path, "--workers", "2", "--chunk", "2", str(tmp_path / "scene.blend")]
+    assert farm.main([*arguments, "--frames", "1:4", "--", "--output", str(tmp_path / "####.exr")]) == 0
+    assert names(tmp_path) == ["0001.exr", "0002.exr", "0003.exr", "0004.exr"]

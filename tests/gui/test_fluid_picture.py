@@ -88,3 +88,18 @@ def test_a_split_area_and_a_second_window(fluid, ring):
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[1]):
         bpy.ops.wm.window_close()
     fluid.check_presence("first_window_again", ring, [CUBE])
+
+
+def test_the_render_engine_draws_its_own_viewport(fluid, ring):
+    """With fluid, meshes and the world; what is hidden in renders hides nothing there."""
+    scene = bpy.context.scene
+    scene.render.engine, scene.meniscus.render_style = "MENISCUS", "flat"
+    bpy.ops.mesh.primitive_cube_add(size=8)
+    hidden = bpy.context.object
+    hidden.hide_render, hidden.display_type = True, "BOUNDS"
+    hidden.select_set(False)
+    ring.space.overlay.show_overlays = False
+    ring.space.shading.type = "RENDERED"
+    fluid.check_presence("ring_engine", ring, [CUBE])
+    scene.meniscus.render_meshes = "NONE"
+    fluid.check_presence("ring_engine_alone", ring)
