@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import bpy
 import gpu
@@ -16,7 +17,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..fluid.lighting import Lighting
 from ..fluid.meshes import Meshes
-from ..render.material_shading import lit_materials, material_parameters
+from ..render.material_shading import shade_points
 
 
 @contextmanager
@@ -65,8 +66,7 @@ def _corner_colors(
     """(corners, 4) of one side: as renders shade them, but for gloss, which would turn with the view."""
     normals = sign * meshes.normals.reshape(-1, 3)
     materials = np.repeat(meshes.material, 3)
-    base = np.array([material.color for material in meshes.materials], np.float32).reshape(-1, 3)[materials]
-    parameters = material_parameters(meshes.materials, materials)
-    parameters["roughness"] = np.ones_like(parameters["roughness"])
-    radiance, _ = lit_materials(normals, normals, corners, base, parameters, lighting)
+    base = np.array([material.color for material in meshes.materials], np.float32)[materials]
+    dull = tuple(replace(material, roughness=1.0, transmission=0.0) for material in meshes.materials)
+    radiance = shade_points(corners, normals, base, materials, dull, lighting)
     return np.concatenate([radiance, np.ones((len(radiance), 1), np.float32)], axis=1)

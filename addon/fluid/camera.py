@@ -225,32 +225,12 @@ class Camera:
         x_max, y_max = np.minimum(np.ceil(pixels.max(axis=0)) + 1, (self.width, self.height))
         return Region(int(x_min), int(y_min), int(x_max), int(y_max)) if x_min < x_max and y_min < y_max else None
 
-    def pixels_of(self, points: FloatArray) -> FloatArray:
-        """(N, 2): where points (N, 3) of world space are in the whole image, in pixels from its lower left.
-
-        NaN where a point is beside the eye of a perspective camera or behind it.
-        """
-        in_view = (points - self.eye) @ self.world_from_view[:3, :3]
-        places = in_view[:, :2]
-        if self.is_perspective:
-            depth = np.where(in_view[:, 2] < 0, -in_view[:, 2], np.nan)
-            places = places / depth[:, None]
-        return np.asarray((places - (self.window.left, self.window.bottom)) / self.pixel_size)
-
     def pixel_centers(self) -> tuple[FloatArray, FloatArray]:
         """Where the region's columns and rows of pixels lie in the window: (width,) and (height,)."""
         region, (pixel_width, pixel_height) = self.active_region, self.pixel_size
         x = self.window.left + (np.arange(region.x_min, region.x_max) + 0.5) * pixel_width
         y = self.window.bottom + (np.arange(region.y_min, region.y_max) + 0.5) * pixel_height
         return x.astype(np.float64, copy=False), y.astype(np.float64, copy=False)
-
-    def view_positions(self, shown: npt.NDArray[np.bool_], depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-        """(count, 3) view space: what pixels (height, width) of the region show at planar depths (height, width)."""
-        rows, columns = np.nonzero(shown)
-        x, y = (centers.astype(np.float32) for centers in self.pixel_centers())
-        found = depth[shown]
-        scale = found if self.is_perspective else np.float32(1)
-        return np.stack([x[columns] * scale, y[rows] * scale, -found], axis=1)
 
     def view_rays(self) -> tuple[FloatArray, FloatArray]:
         """Rays through the pixel centres of the region, in view space.

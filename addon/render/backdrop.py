@@ -12,8 +12,7 @@ from ..fluid.lighting import Lighting
 from ..fluid.meshes import Meshes
 from ..fluid.passes import DEPTH_BACKGROUND
 from . import native
-from .material_shading import lighting_in_view, lit_materials, material_parameters
-from .shading import directions_to_eye, view_normals
+from .material_shading import shade_image
 from .surroundings import Backdrop
 from .vector_math import FloatArray
 
@@ -63,9 +62,9 @@ def backdrop(
     rgba[:] = background
     rgba[is_holdout] = _HOLE
     if shown.any():
-        materials = meshes.material[triangle[shown]]
-        color[shown] = np.array([material.color for material in meshes.materials], np.float32)[materials]
-        rgba[shown] = _shaded(meshes, camera, lighting, shown, depth, normal, color, materials, rgba)
+        material = np.where(shown, meshes.material[triangle], np.int32(-1))
+        color[shown] = np.array([item.color for item in meshes.materials], np.float32)[material[shown]]
+        shade_image(rgba, depth, normal, color, material, camera, meshes.materials, lighting, threads=threads, watch=watch)
     return Backdrop(
         rgba=rgba,
         depth=depth,
@@ -99,28 +98,3 @@ def _rasterized(
             watch=watch,
         )
     return depth, triangle, normal
-
-
-def _shaded(
-    meshes: Meshes,
-    camera: Camera,
-    lighting: Lighting,
-    shown: npt.NDArray[np.bool_],
-    depth: FloatArray,
-    normal: FloatArray,
-    color: FloatArray,
-    materials: npt.NDArray[np.int32],
-    behind: FloatArray,
-) -> FloatArray:
-    """(count, 4): light of what is shown over what is behind it, a part of which clear materials let pass."""
-    radiance, transmittance = lit_materials(
-        view_normals(normal[shown], camera),
-        directions_to_eye(camera, shown),
-        camera.view_positions(shown, depth),
-        color[shown],
-        material_parameters(meshes.materials, materials),
-        lighting_in_view(lighting, camera.view_from_world),
-    )
-    below = behind[shown]
-    alpha = 1 - transmittance.mean(axis=1, keepdims=True) * (1 - below[:, 3:])
-    return np.concatenate([radiance + transmittance * below[:, :3], alpha], axis=1, dtype=np.float32)

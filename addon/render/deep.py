@@ -48,7 +48,7 @@ def render_deep(
     )
     region = camera.cropped()
     with timed(image.info.milliseconds, "spans"):
-        spans = find_spans(balls, region, field, threads, watch_of(is_cancelled, on_progress))
+        spans = find_spans(balls, region, field, threads=threads, watch=watch_of(is_cancelled, on_progress))
         if backdrop is not None:
             spans = spans.before(backdrop.depth)
     return _deep_image(image, spans)

@@ -1,26 +1,90 @@
-"""The look of materials in the light of the scene: a Principled BSDF whose rays end at the first surface.
-
-Each light shines by its own formula, without shadows; the world sends the same light from everywhere. What lies behind a
-surface that lets light pass is laid under it by whoever knows it.
-"""
+"""The look of materials in the light of the scene, by the native core; native/core/src/shading has the formulas."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..fluid.lighting import Light, Lighting, Material, Vector
-from .vector_math import FloatArray, dot, fresnel, highlight, schlick, unit
+from ..fluid.camera import Camera
+from ..fluid.lighting import Lighting, Material, Vector
+from . import native
+from .vector_math import FloatArray
 
-Parameters = dict[str, FloatArray]
-"""The parameters of materials by name, (count,) or (count, 3): of each point."""
+
+def shade_image(
+    rgba: FloatArray,
+    depth: FloatArray,
+    normal: FloatArray,
+    color: FloatArray,
+    material: npt.NDArray[np.int32],
+    camera: Camera,
+    materials: tuple[Material, ...],
+    lighting: Lighting,
+    contrast: FloatArray | None = None,
+    threads: int = 0,
+    watch: Callable[[float], None] = native.let_interrupt,
+) -> None:
+    """Lay the light of a surface over what is behind it.
+
+    Parameters
+    ----------
+    rgba
+        (height, width, 4) premultiplied, linear Rec.709: what is behind; is changed to what is seen.
+    depth, normal, color
+        (height, width), and (height, width, 3) in world space and linear Rec.709.
+    material
+        (height, width): indices into `materials`, negative where nothing is to be shaded.
+    camera
+        What the image shows; it has no region.
+    lighting
+        In world space.
+    contrast
+        (height, width): a factor of the light; None for 1.
+    threads, watch
+        As for :class:`method.Request`.
+
+    Raises
+    ------
+    DeviceError
+        The native core is missing.
+    """
+    core = native.load()
+    in_view = _in_view(lighting, camera.view_from_world)
+    with native.translated_errors():
+        core.shade_image(
+            rgba,
+            *map(np.ascontiguousarray, (depth, normal, color)),
+            np.ascontiguousarray(material, np.int32),
+            None if contrast is None else np.ascontiguousarray(contrast),
+            native.view_tuple(camera),
+            *_scene(materials, in_view),
+            threads=threads,
+            watch=watch,
+        )
 
 
-def lighting_in_view(lighting: Lighting, view_from_world: npt.NDArray[np.float64]) -> Lighting:
+def shade_points(
+    position: FloatArray,
+    normal: FloatArray,
+    color: FloatArray,
+    material: npt.NDArray[np.int32],
+    materials: tuple[Material, ...],
+    lighting: Lighting,
+) -> FloatArray:
+    """(count, 3): the radiance of points that are looked at straight; positions and normals (count, 3) in world space."""
+    radiance = np.empty((len(position), 3), np.float32)
+    arrays = [np.ascontiguousarray(array, np.float32) for array in (position, normal, normal, color)]
+    core = native.load()
+    with native.translated_errors():
+        core.shade_points(radiance, *arrays, np.ascontiguousarray(material, np.int32), *_scene(materials, lighting))
+    return radiance
+
+
+def _in_view(lighting: Lighting, view_from_world: npt.NDArray[np.float64]) -> Lighting:
     """World-space lights in view space."""
     turn, move = view_from_world[:3, :3], view_from_world[:3, 3]
     lights = (
@@ -30,95 +94,12 @@ def lighting_in_view(lighting: Lighting, view_from_world: npt.NDArray[np.float64
     return replace(lighting, lights=tuple(lights))
 
 
-def material_parameters(materials: tuple[Material, ...], source: npt.NDArray[np.int32]) -> Parameters:
-    """The parameters of the materials with the indices `source` (count,)."""
-    return {
-        name: np.array([getattr(material, name) for material in materials], np.float32)[source]
-        for name in ("metallic", "roughness", "transmission", "ior", "emission")
-    }
-
-
-def lit_materials(
-    normal: FloatArray, to_eye: FloatArray, position: FloatArray, base: FloatArray, material: Parameters, lighting: Lighting
-) -> tuple[FloatArray, FloatArray]:
-    """Light that points of a surface send to the eye.
-
-    Parameters
-    ----------
-    normal, to_eye
-        (count, 3) unit; normals face the eye.
-    position
-        (count, 3), in the space of the lights.
-    base
-        (count, 3) base colours.
-    material, lighting
-        The surface and its light.
-
-    Returns
-    -------
-    radiance, transmittance
-        (count, 3) each, linear Rec.709: what the surface sends by itself, and the share of light from behind it that passes.
-    """
-    metallic, clear = material["metallic"][:, None], material["transmission"][:, None]
-    matt = base * (1 - metallic) * (1 - clear)
-    reflected = _reflected(dot(normal, to_eye), base, material)
-    world = np.asarray(lighting.world, np.float32)
-    radiance = material["emission"] + (1 - reflected) * matt * world + reflected * world
-    for light in lighting.lights:
-        toward, irradiance = _LIGHTS[light.kind](light, position)
-        shine = _reflected(dot(toward, unit(to_eye + toward)), base, material)
-        facing = np.maximum(dot(normal, toward), 0)[:, None]
-        gloss = shine * highlight(normal, to_eye, toward, material["roughness"])[:, None]
-        radiance = radiance + irradiance * ((1 - shine) * matt * facing / math.pi + gloss)
-    return np.asarray(radiance, np.float32), np.asarray((1 - reflected) * (1 - metallic) * clear * base, np.float32)
-
-
-def _reflected(cosine: FloatArray, base: FloatArray, material: Parameters) -> FloatArray:
-    """(count, 3): what facets reflect of light at an angle to their normal."""
-    metallic, cosine = material["metallic"][:, None], np.clip(cosine, 1e-3, 1)
-    return np.asarray((1 - metallic) * fresnel(cosine, material["ior"])[:, None] + metallic * schlick(cosine, base))
-
-
 def _vector(values: npt.NDArray[np.float64]) -> Vector:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _sun(light: Light, position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    toward = np.broadcast_to(-np.asarray(light.direction, np.float32), position.shape)
-    return toward, np.asarray(light.power, np.float32)[None]
-
-
-def _point(light: Light, position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    toward, squared = _way_to(light, position)
-    return toward, np.asarray(light.power, np.float32) / (4 * math.pi * squared)[:, None]
-
-
-def _spot(light: Light, position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    toward, irradiance = _point(light, position)
-    cosine, softness = light.cone
-    inside = dot(toward, -np.asarray(light.direction, np.float32)) - cosine
-    place = np.clip(inside / max((1 - cosine) * softness, 1e-6), 0, 1)
-    return toward, irradiance * (place * place * (3 - 2 * place))[:, None]
-
-
-def _area(light: Light, position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Exact on the axis of a disc."""
-    toward, squared = _way_to(light, position)
-    cosine = np.maximum(dot(toward, -np.asarray(light.direction, np.float32)), 0)
-    share = cosine / (math.pi * squared + light.area)
-    return toward, np.asarray(light.power, np.float32) * share[:, None]
-
-
-def _way_to(light: Light, position: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(count, 3) unit vectors to a light, and the squares of its distances."""
-    way = np.asarray(light.position, np.float32) - position
-    squared = np.maximum(dot(way, way), 1e-12)
-    return way / np.sqrt(squared)[:, None], squared
-
-
-_LIGHTS: dict[str, Callable[[Light, FloatArray], tuple[FloatArray, FloatArray]]] = {
-    "SUN": _sun,
-    "POINT": _point,
-    "SPOT": _spot,
-    "AREA": _area,
-}
+def _scene(materials: tuple[Material, ...], lighting: Lighting) -> tuple[Any, ...]:
+    """Materials, lights and world as the core takes them."""
+    surfaces = [(item.metallic, item.roughness, item.transmission, item.ior, item.emission) for item in materials]
+    lights = [(light.kind, light.position, light.direction, light.power, light.area, light.cone) for light in lighting.lights]
+    return surfaces, lights, lighting.world

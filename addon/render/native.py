@@ -52,6 +52,11 @@ def view_arguments(camera: Camera) -> dict[str, Any]:
     }
 
 
+def view_tuple(camera: Camera) -> tuple[Any, ...]:
+    """A camera without region, as those functions take it that need several."""
+    return tuple(view_arguments(camera).values())
+
+
 def numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """An array as the module takes it; float64 and C-contiguous ones are not copied.
 

@@ -12,15 +12,15 @@ import numpy.typing as npt
 from ..fluid.camera import Camera
 from ..fluid.lighting import FluidSource, Material
 from ..fluid.look import LOOK_STYLES, Look
-from ..fluid.passes import PASSES
+from ..fluid.passes import DEPTH_BACKGROUND, PASSES
+from . import native
 from .depth_contrast import spatial_importance
-from .material_shading import Parameters, lighting_in_view, material_parameters
+from .material_shading import shade_image
 from .method import Attribute, Request, Surface
 from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
 from .spans import find_spans
 from .surroundings import Backdrop, Motion
 from .thickness import at_pixels, thickness_image
-from .vector_math import dot
 
 FloatArray = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
@@ -34,6 +34,10 @@ NEEDED: dict[str, Attribute] = {
     "ball_id": "ball",
     "object_index": "ball",
 }
+
+
+# Passes that follow from where the surface lies, with the shape of their pixels.
+_PLACES: dict[str, tuple[int, ...]] = {"position": (3,), "facing": (), "vector": (4,)}
 
 
 class PassImages:
@@ -51,6 +55,8 @@ class PassImages:
         What else there is.
     motion
         Of the camera; None where it stands still.
+    names
+        The passes that will be asked for.
     """
 
     def __init__(
@@ -61,7 +67,9 @@ class PassImages:
         look: Look,
         backdrop: Backdrop | None,
         motion: Motion | None,
+        names: tuple[str, ...],
     ) -> None:
+        self._names = names
         self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
         self._backdrop = backdrop
         self._motion = motion
@@ -70,10 +78,10 @@ class PassImages:
             "combined": lambda: self._combined,
             "depth": lambda: self._depth,
             "normal": lambda: self._normal,
-            "position": lambda: self._position,
-            "vector": self._vector,
+            "position": lambda: self._places["position"],
+            "vector": lambda: self._places["vector"],
             "alpha": lambda: np.ascontiguousarray(self._combined[..., 3]),
-            "facing": self._facing,
+            "facing": lambda: self._places["facing"],
             "thickness": self._length,
             "object_index": self._object_index,
             "color": self._colors,
@@ -151,12 +159,27 @@ class PassImages:
         return self._of_objects("normal", self._surface.normal, lambda backdrop: backdrop.normal)
 
     @cached_property
-    def _position(self) -> FloatArray:
-        positions = np.zeros((*self.hit.shape, 3), np.float32)
-        camera = self._request.camera
-        turn = camera.world_from_view[:3, :3].astype(np.float32)
-        positions[self.hit] = camera.view_positions(self.hit, self._depth) @ turn.T + camera.eye.astype(np.float32)
-        return positions
+    def _places(self) -> dict[str, FloatArray]:
+        """The passes that follow from where the surface lies, of those that are asked for."""
+        request, shape = self._request, self.hit.shape
+        images = {name: np.empty((*shape, *_PLACES[name]), np.float32) for name in _PLACES if name in self._names}
+        motion = self._motion or Motion(self._whole_camera, self._whole_camera, 0.0)
+        core = native.load()
+        with native.translated_errors():
+            core.place(
+                self._depth,
+                self._normal,
+                self._of_fluid(self._velocity, "velocity") if "vector" in images else None,
+                *(images.get(name) for name in _PLACES),
+                background=DEPTH_BACKGROUND,
+                view=native.view_tuple(request.camera),
+                previous=native.view_tuple(replace(motion.previous, region=self._whole_camera.region).cropped()),
+                following=native.view_tuple(replace(motion.following, region=self._whole_camera.region).cropped()),
+                seconds=motion.seconds,
+                threads=request.threads,
+                watch=request.watch,
+            )
+        return images
 
     @cached_property
     def _color(self) -> FloatArray:
@@ -180,28 +203,10 @@ class PassImages:
         velocity = self._velocity
         return self._of_fluid(np.sqrt(np.einsum("ijk,ijk->ij", velocity, velocity)), "speed")
 
-    def _facing(self) -> FloatArray:
-        cosines = np.zeros(self.hit.shape, np.float32)
-        normals = view_normals(self._normal[self.hit], self._request.camera)
-        cosines[self.hit] = np.abs(dot(normals, directions_to_eye(self._request.camera, self.hit)))
-        return cosines
-
-    def _vector(self) -> FloatArray:
-        """(height, width, 4): as Cycles, where the point was by where it is, then where it is by where it will be; pixels."""
-        vector = np.zeros((*self.hit.shape, 4), np.float32)
-        camera, hit = self._whole_camera, self.hit
-        motion = self._motion or Motion(camera, camera, 0.0)
-        here = self._position[hit].astype(np.float64)
-        step = self._of_fluid(self._velocity, "velocity")[hit] * np.float64(motion.seconds)
-        now = camera.pixels_of(here)
-        vector[hit, :2] = motion.previous.pixels_of(here - step) - now
-        vector[hit, 2:] = now - motion.following.pixels_of(here + step)
-        # What passes the eye has no place in the other frame's image.
-        return np.nan_to_num(vector, copy=False)
-
     def _length(self) -> FloatArray:
         request = self._request
-        spans = find_spans(request.balls, request.camera, request.field, request.threads, request.watch)
+        hit = self._surface.hit
+        spans = find_spans(request.balls, request.camera, request.field, hit, request.threads, request.watch)
         if self._backdrop is not None:
             spans = spans.before(self._backdrop.depth)
         return self._of_fluid(spans.thickness, "thickness")
@@ -225,15 +230,35 @@ class PassImages:
     def _combined(self) -> FloatArray:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
         shown = self._fluid
-        rgba = np.zeros((*shown.shape, 4), np.float32) if self._backdrop is None else np.array(self._backdrop.rgba)
+        rgba = np.zeros((*shown.shape, 4), np.float32) if self._backdrop is None else np.array(self._backdrop.rgba, order="C")
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
-        if shown.any():
+        if not shown.any():
+            return rgba
+        if LOOK_STYLES[self._look.style].uses_scene:
+            self._shade_materials(rgba)
+        else:
             balls, camera = self._request.balls, self._request.camera
             ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
-            look = replace(self._look, lighting=lighting_in_view(self._look.lighting, camera.view_from_world))
-            rgba[shown] = shaded(self._points(shown), look, ranges).over(rgba[shown])
+            rgba[shown] = shaded(self._points(shown), self._look, ranges).over(rgba[shown])
         return rgba
+
+    def _shade_materials(self, rgba: FloatArray) -> None:
+        """Lay the fluid's materials over `rgba`."""
+        request, surface = self._request, self._surface
+        shade_image(
+            rgba,
+            surface.depth,
+            surface.normal,
+            self._color,
+            np.where(self._fluid, self._source, np.int32(-1)),
+            request.camera,
+            tuple(source.material for source in self._sources),
+            self._look.lighting,
+            self._contrast,
+            request.threads,
+            request.watch,
+        )
 
     def _points(self, shown: BoolArray) -> SurfacePoints:
         """What is shown, as the look needs it."""
@@ -243,15 +268,13 @@ class PassImages:
             normal=view_normals(surface.normal[shown], camera),
             to_eye=to_eye,
             up=camera.world_from_view[2, :3].astype(np.float32),
-            position=camera.view_positions(shown, surface.depth),
             world_normal=surface.normal[shown],
             base=self._color[shown],
             velocity=self._velocity[shown],
             depth=surface.depth[shown],
             ball=self._ball_id()[shown],
             thickness=self._thickness(shown),
-            contrast=self._contrast(shown),
-            material=self._material(shown),
+            contrast=np.ones(len(to_eye), np.float32) if self._contrast is None else self._contrast[shown],
         )
 
     def _thickness(self, shown: BoolArray) -> FloatArray:
@@ -261,16 +284,12 @@ class PassImages:
         camera = self._request.camera
         return at_pixels(thickness_image(self._request.balls, camera, self._request.field), camera, shown)
 
-    def _contrast(self, shown: BoolArray) -> FloatArray:
-        """(count,): the factor by which depth contrast changes the light."""
+    @property
+    def _contrast(self) -> FloatArray | None:
+        """(height, width): the factor by which depth contrast changes the light; None for 1."""
         look = self._look
         if look.depth_contrast == 0:
-            return np.ones(np.count_nonzero(shown), np.float32)
-        importance = spatial_importance(self._depth, self.hit, self._whole_camera, look.depth_contrast_radius)[shown]
+            return None
+        importance = spatial_importance(self._depth, self.hit, self._whole_camera, look.depth_contrast_radius)
         # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
         return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
-
-    def _material(self, shown: BoolArray) -> Parameters:
-        if not LOOK_STYLES[self._look.style].uses_scene:
-            return {}
-        return material_parameters(tuple(source.material for source in self._sources), self._source[shown])

@@ -198,7 +198,7 @@ class _Shot:
         """The passes of what the method has found."""
         report = self._report(surface)
         with timed(report.milliseconds, "passes"):
-            made = PassImages(surface, self.request, self.camera, self.look, self.backdrop, self.motion)
+            made = PassImages(surface, self.request, self.camera, self.look, self.backdrop, self.motion, self.passes)
             images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
             objects = _in_whole_image(made.objects, self.camera, -1) if "object_index" in self.passes else None
             return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)

@@ -1,4 +1,4 @@
-"""The looks: the colours of the Combined pass. gpu_shaders/lib/shading.glsl has the same formulas, for the viewports."""
+"""The looks but for that of materials: colours of the Combined pass. gpu_shaders/lib/shading.glsl has the same formulas."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from ..fluid.camera import Camera
 from ..fluid.look import SPEED_COLORS, Look
-from .material_shading import Parameters, lit_materials
 from .vector_math import FloatArray, dot, fresnel, highlight, schlick, unit
 
 DIELECTRIC = 0.04
@@ -28,8 +27,6 @@ class SurfacePoints:
     ----------
     normal, to_eye, up
         Unit, view space: x to the right, y up, z to the eye. `up` (3,) is the zenith of the world.
-    position
-        View space, Blender units.
     world_normal
         Unit, world space.
     base
@@ -44,14 +41,11 @@ class SurfacePoints:
         Length of the way through the fluid, Blender units.
     contrast
         Factor of the light.
-    material
-        Of the sources, see :func:`material_shading.material_parameters`; empty where the look shows none.
     """
 
     normal: FloatArray
     to_eye: FloatArray
     up: FloatArray
-    position: FloatArray
     world_normal: FloatArray
     base: FloatArray
     velocity: FloatArray
@@ -59,7 +53,6 @@ class SurfacePoints:
     ball: FloatArray
     thickness: FloatArray
     contrast: FloatArray
-    material: Parameters
 
 
 @dataclass(frozen=True)
@@ -186,11 +179,6 @@ def _water(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArra
     return Shaded((look.light_strength * points.contrast)[:, None] * color, (1 - reflected)[:, None] * passes)
 
 
-def _material(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
-    radiance, transmittance = lit_materials(normal, points.to_eye, points.position, points.base, points.material, look.lighting)
-    return Shaded(points.contrast[:, None] * radiance, transmittance)
-
-
 def _headlight(points: SurfacePoints, look: Look, _ranges: Ranges, normal: FloatArray) -> Shaded:
     light = look.ambient + (1 - look.ambient) * dot(normal, points.to_eye)
     return _opaque((points.contrast * light)[:, None] * points.base)
@@ -245,7 +233,6 @@ def _share_of_range(value: FloatArray, ends: tuple[float, float]) -> FloatArray:
 _STYLES: dict[str, Callable[[SurfacePoints, Look, Ranges, FloatArray], Shaded]] = {
     "studio": _studio,
     "water": _water,
-    "material": _material,
     "headlight": _headlight,
     "flat": _flat,
     "normal": _normal,

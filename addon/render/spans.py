@@ -68,7 +68,14 @@ class Spans:
         )
 
 
-def find_spans(balls: Balls, camera: Camera, field: Field, threads: int = 0, watch: Watch = let_interrupt) -> Spans:
+def find_spans(
+    balls: Balls,
+    camera: Camera,
+    field: Field,
+    hit: npt.NDArray[np.bool_] | None = None,
+    threads: int = 0,
+    watch: Watch = let_interrupt,
+) -> Spans:
     """Find all spans of the rays through the centres of a camera's pixels.
 
     From each crossing the next one is looked for, so that the time goes with the crossings, not with the balls.
@@ -77,6 +84,8 @@ def find_spans(balls: Balls, camera: Camera, field: Field, threads: int = 0, wat
     ----------
     balls, camera, field
         What is seen, from where, and which isosurface of it.
+    hit
+        (height, width) of the camera's region: whose rays are asked for; None for all.
     threads, watch
         See :class:`fitted_bvh.FittedBvh`.
 
@@ -85,49 +94,70 @@ def find_spans(balls: Balls, camera: Camera, field: Field, threads: int = 0, wat
     DeviceError
         The native core is missing, or there is too little memory.
     """
-    return _Search(balls, camera, field, threads, watch).spans()
+    return _Search(balls, camera, field, hit, threads, watch).spans()
 
 
 class _Search:
-    def __init__(self, balls: Balls, camera: Camera, field: Field, threads: int, watch: Watch) -> None:
+    def __init__(
+        self,
+        balls: Balls,
+        camera: Camera,
+        field: Field,
+        hit: npt.NDArray[np.bool_] | None,
+        threads: int,
+        watch: Watch,
+    ) -> None:
         self._camera, self._threads, self._watch = camera, threads, watch
         self._tree = FittedBvh(balls, field, threads=threads, watch=watch)
         self._radius = float(balls.radii.min()) if len(balls) else 1.0
-        origins, directions = camera.view_rays()
-        turn = camera.world_from_view[:3, :3]
-        self._origins = np.ascontiguousarray(origins.reshape(-1, 3) @ turn.T + camera.eye)
-        directions = directions.reshape(-1, 3) @ turn.T
-        self._scale = np.linalg.norm(directions, axis=1)  # from planar depth to length
-        self._directions = np.ascontiguousarray(directions / self._scale[:, None])
-        count = len(directions)
-        self._enter = camera.clip_start * self._scale
+        region = camera.active_region
+        self._shape = region.height, region.width
+        self._pixels = np.arange(region.height * region.width) if hit is None else np.flatnonzero(hit)
+        self._origins, self._directions, self._scale = self._rays()
+        count = len(self._pixels)
+        self._is_inside, self._enter = np.zeros(count, np.bool_), camera.clip_start * self._scale
         self._normal = np.zeros((count, 3), np.float32)
         self._found: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64], npt.NDArray[np.float64], FloatArray]] = []
+
+    def _rays(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """World space: origins and unit directions (count, 3), and the factor from planar depth to length (count,)."""
+        camera = self._camera
+        turn = camera.world_from_view[:3, :3]
+        x, y = camera.pixel_centers()
+        rows, columns = np.divmod(self._pixels, self._shape[1])
+        plane = np.stack([x[columns], y[rows], np.zeros(len(rows))], axis=1)
+        if camera.is_perspective:
+            plane[:, 2] = -1
+            scale = np.sqrt(np.einsum("ij,ij->i", plane, plane))
+            directions = (plane / scale[:, None]) @ turn.T
+            return np.ascontiguousarray(np.broadcast_to(camera.eye, plane.shape)), np.ascontiguousarray(directions), scale
+        forward = np.ascontiguousarray(np.broadcast_to(-turn[:, 2], plane.shape))
+        return np.ascontiguousarray(plane @ turn.T + camera.eye), forward, np.ones(len(rows))
 
     def spans(self) -> Spans:
         start, end = self._enter.copy(), self._camera.clip_end * self._scale
         pending: npt.NDArray[np.int64] = np.arange(len(start))
-        self._is_inside = self._starts_inside(start)
+        is_first = True
         while len(pending):
-            pending = self._advance(pending, start, end)
+            pending = self._advance(pending, start, end, is_first)
+            is_first = False
         return self._joined()
 
-    def _starts_inside(self, start: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-        """Whether rays are in the fluid at distances: there they next leave it, wherever that is."""
-        hits = self._tree.first_hit(self._origins, self._directions, start, threads=self._threads, watch=self._watch)
-        return np.asarray(np.isfinite(hits.t) & (np.einsum("ij,ij->i", hits.normals, self._directions) > 0))
-
     def _advance(
-        self, pending: npt.NDArray[np.int64], start: npt.NDArray[np.float64], end: npt.NDArray[np.float64]
+        self, pending: npt.NDArray[np.int64], start: npt.NDArray[np.float64], end: npt.NDArray[np.float64], is_first: bool
     ) -> npt.NDArray[np.int64]:
         """Take one more crossing of each ray behind `start`, which moves on; the rays that may have more to come."""
-        origins, directions = self._origins[pending], self._directions[pending]
-        hits = self._tree.first_hit(origins, directions, start[pending], end[pending], threads=self._threads, watch=self._watch)
-        crosses = np.isfinite(hits.t)
+        hits = self._tree.first_hit(
+            self._origins[pending], self._directions[pending], start[pending], threads=self._threads, watch=self._watch
+        )
+        slopes = np.einsum("ij,ij->i", hits.normals, self._directions[pending])
+        if is_first:
+            # What a ray leaves next it is in, wherever that is.
+            self._is_inside = np.isfinite(hits.t) & (slopes > 0)
+        crosses = hits.t < end[pending]
         ended = pending[~crosses]
         self._leave(ended[self._is_inside[ended]], end)
-        rays, t, normals = pending[crosses], hits.t[crosses], hits.normals[crosses]
-        slope = np.einsum("ij,ij->i", normals, self._directions[rays])
+        rays, t, normals, slope = pending[crosses], hits.t[crosses], hits.normals[crosses], slopes[crosses]
         # A ray that leaves without having entered did so where the last crossing was, too near to it to be found.
         missed = (slope >= 0) & ~self._is_inside[rays]
         self._begin(rays[missed], start, np.zeros((np.count_nonzero(missed), 3), np.float32))
@@ -153,6 +183,5 @@ class _Search:
         rays, enter, leave, normal = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         order = np.lexsort((enter, rays))
         rays, enter, leave = rays[order], enter[order], leave[order]
-        height, width = self._camera.active_region.height, self._camera.active_region.width
         scale = self._scale[rays]
-        return Spans((height, width), rays, enter / scale, leave / scale, leave - enter, normal[order])
+        return Spans(self._shape, self._pixels[rays], enter / scale, leave / scale, leave - enter, normal[order])

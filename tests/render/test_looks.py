@@ -57,13 +57,11 @@ def points():
         up=np.broadcast_to(up / np.linalg.norm(up), (COUNT, 3)).astype(np.float32),
         world_normal=unit(rng),
         base=rng.uniform(0, 1.3, (COUNT, 3)).astype(np.float32),
-        position=rng.normal(size=(COUNT, 3)).astype(np.float32),
         velocity=rng.normal(size=(COUNT, 3)).astype(np.float32) * 2,
         depth=rng.uniform(1, 8, COUNT).astype(np.float32),
         ball=rng.integers(0, 1 << 22, COUNT).astype(np.float32),
         thickness=rng.uniform(0, 3, COUNT).astype(np.float32),
         contrast=rng.uniform(0.2, 1.8, COUNT).astype(np.float32),
-        material={},
     )
 
 
@@ -74,7 +72,7 @@ def colors(points, look):
 
 def colors_by_shader(gl, points, look):
     """(count, 4): what lib/shading.glsl makes of the points."""
-    names = [item.name for item in fields(points) if item.name not in ("position", "material")]
+    names = [item.name for item in fields(points)]
     inputs = "".join(f"in {'float' if name in SIZES else 'vec3'} in_{name};\n" for name in names)
     assigned = " ".join(f"seen.{name} = in_{name};" for name in names)
     text = Source("lib/shading.glsl", look_constants()).text + inputs + MAIN.replace("INPUTS", assigned)

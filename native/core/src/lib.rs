@@ -11,6 +11,8 @@ pub mod job;
 pub mod kernel;
 pub mod memory;
 pub mod oracle;
+pub mod placing;
 pub mod rasterizer;
+pub mod shading;
 pub mod simd;
 pub mod tile_caster;

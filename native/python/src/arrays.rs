@@ -24,11 +24,7 @@ impl<'py, T: Element, const C: usize> Rows<'py, T, C> {
     pub fn borrow(name: &str, argument: &Bound<'py, PyAny>) -> PyResult<Self> {
         let columns = if C == 1 { vec![None] } else { vec![None, Some(C)] };
         check::<T>(name, argument, &columns)?;
-        let array: PyReadonlyArrayDyn<'py, T> = argument.extract()?;
-        if array.as_slice().is_err() {
-            return Err(python_error(Error::InvalidInput(format!("the numbers of {name} must be aligned in memory"))));
-        }
-        Ok(Self(array))
+        aligned(name, argument).map(Self)
     }
 
     /// The rows.
@@ -98,6 +94,40 @@ impl<'a> Fluid<'a> {
         let field = Field::new(Kernel::new(self.kernel)?, self.isovalue)?;
         Ok((Balls::new(self.positions, self.radii, self.weights)?, field))
     }
+}
+
+/// A C-contiguous image (height, width, C), or (height, width) where C is 1, borrowed to be read.
+pub struct ReadPixels<'py, T: Element, const C: usize>(PyReadonlyArrayDyn<'py, T>);
+
+impl<'py, T: Element, const C: usize> ReadPixels<'py, T, C> {
+    /// Borrows the argument `name`, an image of `width` x `height`.
+    ///
+    /// # Errors
+    /// ValueError that says what was expected: type, dtype, shape, contiguity or alignment.
+    pub fn borrow(name: &str, argument: &Bound<'py, PyAny>, [width, height]: [usize; 2]) -> PyResult<Self> {
+        let shape = [Some(height), Some(width), Some(C)];
+        check::<T>(name, argument, if C == 1 { &shape[..2] } else { &shape })?;
+        aligned(name, argument).map(Self)
+    }
+
+    /// The pixels, row after row.
+    pub fn rows(&self) -> &[[T; C]] {
+        self.numbers().as_chunks().0
+    }
+
+    /// All numbers, row after row.
+    pub fn numbers(&self) -> &[T] {
+        // `borrow` has seen that it is contiguous and aligned.
+        self.0.as_slice().unwrap_or_default()
+    }
+}
+
+fn aligned<'py, T: Element>(name: &str, argument: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    let array: PyReadonlyArrayDyn<'py, T> = argument.extract()?;
+    if array.as_slice().is_err() {
+        return Err(python_error(Error::InvalidInput(format!("the numbers of {name} must be aligned in memory"))));
+    }
+    Ok(array)
 }
 
 /// A C-contiguous image (height, width, C), or (height, width) where C is 1, borrowed to be written.

@@ -6,6 +6,7 @@ mod fitted_bvh;
 mod oracle;
 mod rasterizer;
 mod run;
+mod shading;
 mod tile_caster;
 
 use pyo3::prelude::*;
@@ -20,6 +21,8 @@ mod meniscus_native {
     use super::oracle::{oracle_cast, oracle_crossings};
     #[pymodule_export]
     use super::rasterizer::rasterize;
+    #[pymodule_export]
+    use super::shading::{place, shade_image, shade_points};
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
 

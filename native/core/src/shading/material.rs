@@ -1,0 +1,256 @@
+//! The light of sixteen points.
+
+use std::f32::consts::PI;
+
+use super::Scene;
+use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
+
+/// A surface, apart from its colour.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Material {
+    /// 0 to 1.
+    pub metallic: f32,
+    /// 0 to 1.
+    pub roughness: f32,
+    /// 0 to 1.
+    pub transmission: f32,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Radiance that it gives off.
+    pub emission: [f32; 3],
+}
+
+/// How a light shines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightKind {
+    /// Parallel light; its power is that on a square unit.
+    Sun,
+    /// Evenly to all sides.
+    Point,
+    /// As a point, in a cone.
+    Spot,
+    /// To one side; exact on the axis of a disc.
+    Area,
+}
+
+/// A light.
+#[derive(Clone, Copy, Debug)]
+pub struct Light {
+    /// How it shines.
+    pub kind: LightKind,
+    /// Where it is.
+    pub position: [f32; 3],
+    /// Unit: where it shines.
+    pub direction: [f32; 3],
+    /// Of each channel.
+    pub power: [f32; 3],
+    /// Of an area light, square units.
+    pub area: f32,
+    /// Of a spot: cosine of half its angle, and the share of it over which its border is soft.
+    pub cone: [f32; 2],
+}
+
+/// Three vectors of lanes: coordinates, or channels.
+pub struct Triple<S: Simd>(pub [S::Vector; 3]);
+
+impl<S: Simd> Clone for Triple<S> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S: Simd> Copy for Triple<S> {}
+
+impl<S: Simd> Triple<S> {
+    #[inline(always)]
+    fn splat(simd: S, numbers: [f32; 3]) -> Self {
+        Self(numbers.map(|number| simd.splat(number)))
+    }
+
+    /// The scalar product.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> S::Vector {
+        let ([a, b, c], [d, e, f]) = (self.0, other.0);
+        a.mul_add(d, b.mul_add(e, c * f))
+    }
+
+    #[inline(always)]
+    fn scaled(self, factor: S::Vector) -> Self {
+        Self(self.0.map(|part| part * factor))
+    }
+
+    #[inline(always)]
+    fn zipped(self, other: Self, operation: impl Fn(S::Vector, S::Vector) -> S::Vector) -> Self {
+        let ([a, b, c], [d, e, f]) = (self.0, other.0);
+        Self([operation(a, d), operation(b, e), operation(c, f)])
+    }
+}
+
+/// What a surface sends to the eye.
+pub struct Shaded<S: Simd> {
+    /// By itself.
+    pub radiance: Triple<S>,
+    /// The share of the light from behind that passes.
+    pub transmittance: Triple<S>,
+}
+
+/// The parameters of sixteen materials.
+struct Parameters<S: Simd> {
+    metallic: S::Vector,
+    roughness: S::Vector,
+    transmission: S::Vector,
+    ior: S::Vector,
+    emission: Triple<S>,
+}
+
+impl<S: Simd> Parameters<S> {
+    #[inline(always)]
+    fn gathered(simd: S, materials: &[Material], indices: &[usize; LANES]) -> Self {
+        let get = |parameter: fn(&Material) -> f32| {
+            let mut lanes = Lanes::splat(0.0);
+            for (lane, index) in lanes.0.iter_mut().zip(indices) {
+                *lane = parameter(&materials[*index]);
+            }
+            simd.load(&lanes)
+        };
+        Self {
+            metallic: get(|material| material.metallic),
+            roughness: get(|material| material.roughness),
+            transmission: get(|material| material.transmission),
+            ior: get(|material| material.ior),
+            emission: Triple([
+                get(|material| material.emission[0]),
+                get(|material| material.emission[1]),
+                get(|material| material.emission[2]),
+            ]),
+        }
+    }
+
+    /// What facets reflect of light at an angle to their normal, given its cosine.
+    #[inline(always)]
+    fn reflected(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Triple<S> {
+        let one = simd.splat(1.0);
+        let cosine = cosine.max(simd.splat(1e-3)).min(one);
+        let dielectric = self.fresnel(simd, cosine);
+        let grazing = one - cosine;
+        let squared = grazing * grazing;
+        let grazing = squared * squared * grazing;
+        Triple(base.0.map(|channel| {
+            let metal = channel + (one - channel) * grazing;
+            dielectric + self.metallic * (metal - dielectric)
+        }))
+    }
+
+    /// What of unpolarized light a smooth dielectric reflects.
+    #[inline(always)]
+    fn fresnel(&self, simd: S, cosine: S::Vector) -> S::Vector {
+        let (one, ior) = (simd.splat(1.0), self.ior);
+        let within = (one - (one - cosine * cosine) / (ior * ior)).max(simd.splat(0.0)).sqrt();
+        let across = (cosine - ior * within) / (cosine + ior * within);
+        let along = (ior * cosine - within) / (ior * cosine + within);
+        simd.splat(0.5) * (across * across + along * along)
+    }
+}
+
+/// Sixteen numbers, or fewer and zeros.
+#[inline(always)]
+pub fn numbers<S: Simd>(simd: S, numbers: &[f32]) -> S::Vector {
+    let mut lanes = Lanes::splat(0.0);
+    lanes.0[..numbers.len()].copy_from_slice(numbers);
+    simd.load(&lanes)
+}
+
+/// Sixteen vectors, or fewer and zeros.
+#[inline(always)]
+pub fn triples<S: Simd>(simd: S, triples: &[[f32; 3]]) -> Triple<S> {
+    let mut lanes = [Lanes::splat(0.0); 3];
+    for (lane, triple) in triples.iter().enumerate() {
+        for axis in 0..3 {
+            lanes[axis].0[lane] = triple[axis];
+        }
+    }
+    Triple([simd.load(&lanes[0]), simd.load(&lanes[1]), simd.load(&lanes[2])])
+}
+
+/// The light of sixteen points whose normals face the eye.
+#[inline(always)]
+pub fn shade<S: Simd>(
+    simd: S,
+    scene: &Scene<'_>,
+    material: &[usize; LANES],
+    position: Triple<S>,
+    normal: Triple<S>,
+    to_eye: Triple<S>,
+    base: Triple<S>,
+) -> Shaded<S> {
+    let (one, zero) = (simd.splat(1.0), simd.splat(0.0));
+    let parameters = Parameters::gathered(simd, scene.materials, material);
+    let body = one - parameters.metallic;
+    let matt = base.scaled(body * (one - parameters.transmission));
+    let reflected = parameters.reflected(simd, normal.dot(to_eye), base);
+    let world = Triple::splat(simd, scene.world);
+    let soft = matt.zipped(reflected, |matt, reflected| reflected + (one - reflected) * matt);
+    let mut radiance = parameters.emission.zipped(soft.zipped(world, |soft, world| soft * world), |a, b| a + b);
+    for light in scene.lights {
+        let (toward, irradiance) = shine(simd, light, position);
+        let facing = normal.dot(toward).max(zero);
+        if !zero.lt(facing).any() {
+            continue;
+        }
+        let between = unit(simd, to_eye.zipped(toward, |a, b| a + b));
+        let near = toward.dot(between);
+        let mirrored = parameters.reflected(simd, near, base);
+        let gloss = facets(simd, parameters.roughness, normal.dot(between), near, facing);
+        let diffuse = facing * simd.splat(1.0 / PI);
+        let sent = matt.zipped(mirrored, |matt, mirrored| (one - mirrored) * matt * diffuse + mirrored * gloss);
+        radiance = radiance.zipped(sent.zipped(irradiance, |sent, irradiance| sent * irradiance), |a, b| a + b);
+    }
+    let clear = body * parameters.transmission;
+    let transmittance = base.zipped(reflected, |base, reflected| (one - reflected) * clear * base);
+    Shaded { radiance, transmittance }
+}
+
+/// What of a light's irradiance facets send to the eye, without what they let pass: Trowbridge and Reitz's distribution (GGX),
+/// with the usual approximation of what they hide (Karis 2013).
+#[inline(always)]
+fn facets<S: Simd>(simd: S, roughness: S::Vector, cosine: S::Vector, near: S::Vector, facing: S::Vector) -> S::Vector {
+    let one = simd.splat(1.0);
+    let alpha = (roughness * roughness).max(simd.splat(0.002));
+    let squared = alpha * alpha;
+    let cosine = cosine.max(simd.splat(0.0));
+    let spread = (cosine * cosine).mul_add(squared - one, one);
+    let near = near.max(simd.splat(0.1));
+    let hidden = simd.splat(4.0 * PI) * spread * spread * near * near * (alpha + simd.splat(0.5));
+    (squared / hidden * facing).min(simd.splat(16.0))
+}
+
+/// Unit vectors to a light, and its irradiance on what faces it.
+#[inline(always)]
+fn shine<S: Simd>(simd: S, light: &Light, position: Triple<S>) -> (Triple<S>, Triple<S>) {
+    let (one, zero) = (simd.splat(1.0), simd.splat(0.0));
+    let power = Triple::splat(simd, light.power);
+    let back = Triple::splat(simd, light.direction.map(|part| -part));
+    if light.kind == LightKind::Sun {
+        return (back, power);
+    }
+    let way = Triple::splat(simd, light.position).zipped(position, |light, point| light - point);
+    let squared = way.dot(way).max(simd.splat(1e-12));
+    let toward = way.scaled(one / squared.sqrt());
+    let cosine = toward.dot(back);
+    let share = match light.kind {
+        LightKind::Area => cosine.max(zero) / (simd.splat(PI) * squared + simd.splat(light.area)),
+        LightKind::Spot => {
+            let soft = ((1.0 - light.cone[0]) * light.cone[1]).max(1e-6);
+            let place = ((cosine - simd.splat(light.cone[0])) * simd.splat(1.0 / soft)).max(zero).min(one);
+            place * place * (simd.splat(3.0) - simd.splat(2.0) * place) / (simd.splat(4.0 * PI) * squared)
+        }
+        LightKind::Point | LightKind::Sun => one / (simd.splat(4.0 * PI) * squared),
+    };
+    (toward, power.scaled(share))
+}
+
+#[inline(always)]
+fn unit<S: Simd>(simd: S, vector: Triple<S>) -> Triple<S> {
+    vector.scaled(simd.splat(1.0) / vector.dot(vector).max(simd.splat(1e-30)).sqrt())
+}
