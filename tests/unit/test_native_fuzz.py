@@ -56,6 +56,24 @@ def raising(share: float) -> None:
     raise ValueError(f"given up at {share}")
 
 
+VECTOR = st.tuples(*[st.floats(-2, 2, width=32)] * 3)
+LIGHTS = st.tuples(
+    st.sampled_from(["SUN", "POINT", "SPOT", "AREA"]),
+    VECTOR,
+    VECTOR,
+    VECTOR,
+    st.floats(0, 2, width=32),
+    st.tuples(st.floats(0, 1, width=32), st.floats(0, 1, width=32)),
+)
+
+
+def views(sizes: Sizes) -> st.SearchStrategy[tuple[Any, ...]]:
+    """A camera as one argument."""
+    eye = array("f8", -2, 2, 3).map(lambda numbers: numbers.tolist())
+    fixed = np.eye(3).tolist(), [-1.0, 1.0, -1.0, 1.0], [0.125, 8.0]
+    return st.builds(lambda at, flag: (fixed[0], at, fixed[1], flag, sizes.width, sizes.height, fixed[2]), eye, st.booleans())
+
+
 # For each parameter's name: what fits it.
 FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "positions": lambda sizes: array("f4", -2, 2, sizes.balls, 3),
@@ -81,11 +99,35 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     ),
     "background": lambda sizes: st.just(1e10),
     "stride": lambda sizes: st.sampled_from([4, 2, 1]),
+    "vertices": lambda sizes: array("f4", -2, 2, sizes.balls, 3),
+    "triangles": lambda sizes: array("i4", 0, max(sizes.balls, 1), sizes.rays, 3),
+    "normals": lambda sizes: array("f4", -1, 1, sizes.rays, 9),
+    "triangle": lambda sizes: array("i4", 0, 1, sizes.height, sizes.width),
+    "rgba": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width, 4),
+    "vector": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width, 4),
+    "facing": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width),
+    "contrast": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width),
+    "color": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width, 3),
+    "velocity": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width, 3),
+    "position": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width, 3),
+    "material": lambda sizes: array("i4", -2, 3, sizes.height, sizes.width),
+    "radiance": lambda sizes: array("f4", 0, 1, sizes.balls, 3),
+    "point_normals": lambda sizes: array("f4", -1, 1, sizes.balls, 3),
+    "to_eyes": lambda sizes: array("f4", -1, 1, sizes.balls, 3),
+    "point_colors": lambda sizes: array("f4", 0, 1, sizes.balls, 3),
+    "point_materials": lambda sizes: array("i4", 0, 2, sizes.balls),
+    "materials": lambda sizes: st.lists(
+        st.tuples(*[st.floats(0, 2, width=32)] * 4, st.just((0.0, 0.5, 1.0))), min_size=1, max_size=3
+    ),
+    "lights": lambda sizes: st.lists(LIGHTS, max_size=3),
+    "world": lambda sizes: array("f4", 0, 1, 3).map(lambda numbers: numbers.tolist()),
+    "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
 FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves")
 FITTING["coefficients"] = FITTING["kernel"]
+FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}
 
 

@@ -64,28 +64,29 @@ pub fn shade_image(
 
 /// The radiance of points, without what is behind them.
 ///
-/// radiance (N, 3): to be written. position, normal, to_eye, color (N, 3) float32; material (N,) int32. Lights are in the space
+/// radiance (N, 3): to be written. positions, point_normals, to_eyes, point_colors (N, 3) float32; point_materials (N,) int32. Lights are in the space
 /// of the points.
 #[pyfunction]
-#[pyo3(signature = (radiance, position, normal, to_eye, color, material, materials, lights, world, threads=0, watch=None))]
+#[pyo3(signature = (radiance, positions, point_normals, to_eyes, point_colors, point_materials, materials, lights, world, threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn shade_points(
     python: Python<'_>,
     radiance: &Bound<'_, PyAny>,
-    position: &Bound<'_, PyAny>,
-    normal: &Bound<'_, PyAny>,
-    to_eye: &Bound<'_, PyAny>,
-    color: &Bound<'_, PyAny>,
-    material: &Bound<'_, PyAny>,
+    positions: &Bound<'_, PyAny>,
+    point_normals: &Bound<'_, PyAny>,
+    to_eyes: &Bound<'_, PyAny>,
+    point_colors: &Bound<'_, PyAny>,
+    point_materials: &Bound<'_, PyAny>,
     materials: Vec<MaterialArguments>,
     lights: Vec<LightArguments>,
     world: [f32; 3],
     threads: usize,
     watch: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<()> {
-    let (position, normal) = (Rows::<f32, 3>::borrow("position", position)?, Rows::<f32, 3>::borrow("normal", normal)?);
-    let (to_eye, color) = (Rows::<f32, 3>::borrow("to_eye", to_eye)?, Rows::<f32, 3>::borrow("color", color)?);
-    let material = Rows::<i32, 1>::borrow("material", material)?;
+    let (position, normal) =
+        (Rows::<f32, 3>::borrow("positions", positions)?, Rows::<f32, 3>::borrow("point_normals", point_normals)?);
+    let (to_eye, color) = (Rows::<f32, 3>::borrow("to_eyes", to_eyes)?, Rows::<f32, 3>::borrow("point_colors", point_colors)?);
+    let material = Rows::<i32, 1>::borrow("point_materials", point_materials)?;
     let mut radiance = Pixels::<f32, 1>::borrow("radiance", radiance, [3, material.numbers().len()])?;
     let (materials, lights) = (materials_of(materials), lights_of(lights)?);
     let scene = Scene::new(&materials, &lights, world).map_err(python_error)?;
