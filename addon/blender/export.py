@@ -24,6 +24,13 @@ _TICK = 0.02
 
 Result = set[str]
 
+# Python 3.11 sees no other names in a comprehension within an annotation.
+_LAYOUTS = [
+    (name, label, LAYOUTS[name])
+    for name, label in (("MULTILAYER", "Multilayer"), ("MULTIPART", "Multi-Part"), ("PASSES", "Files"))
+]
+_COMPRESSIONS = [(name, name.title(), text) for name, text in COMPRESSIONS.items()]
+
 
 class MENISCUS_OT_export_passes(bpy.types.Operator):
     """Render the passes that the view layer asks for to OpenEXR files; overwriting and placeholders are those of the output"""
@@ -42,9 +49,7 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
     layout: EnumProperty(
         name="Layout",
         description="How passes are put into files",
-        items=[
-            (name, label, LAYOUTS[name]) for name, label in zip(LAYOUTS, ("Multilayer", "Multi-Part", "Files"), strict=True)
-        ],
+        items=_LAYOUTS,
     )
     use_deep: BoolProperty(
         name="Deep", description="Also write a deep file, which can be merged with smoke and solids inside the fluid"
@@ -52,7 +57,7 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
     compression: EnumProperty(
         name="Compression",
         description="All lossless",
-        items=[(name, name.title(), text) for name, text in COMPRESSIONS.items()],
+        items=_COMPRESSIONS,
     )
 
     @classmethod
