@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -57,9 +58,7 @@ def render_deep(
 def _colorless(backdrop: Backdrop, camera: Camera) -> Backdrop:
     """What hides the fluid in the same way, and leaves a hole."""
     empty = Backdrop.empty(camera.cropped())
-    return Backdrop(
-        empty.rgba, backdrop.depth, empty.normal, empty.color, empty.object, np.broadcast_to(np.True_, backdrop.depth.shape)
-    )
+    return replace(backdrop, rgba=empty.rgba, is_holdout=np.broadcast_to(np.True_, backdrop.depth.shape))
 
 
 def _deep_image(image: ImageBuffers, spans: Spans) -> DeepImage:

@@ -71,28 +71,15 @@ class PassImages:
     ) -> None:
         self._names = names
         self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
-        self._backdrop = backdrop
+        self._behind = backdrop
+        # Where no object is behind, the fluid's passes are whole as they are.
+        self._backdrop = backdrop if backdrop is not None and backdrop.names else None
         self._motion = motion
         self._sources = look.sources or (FluidSource(material=Material(color=look.color)),)
-        self._makers: dict[str, Callable[[], FloatArray]] = {
-            "combined": lambda: self._combined,
-            "depth": lambda: self._depth,
-            "normal": lambda: self._normal,
-            "position": lambda: self._places["position"],
-            "vector": lambda: self._places["vector"],
-            "alpha": lambda: np.ascontiguousarray(self._combined[..., 3]),
-            "facing": lambda: self._places["facing"],
-            "thickness": self._length,
-            "object_index": self._object_index,
-            "color": self._colors,
-            "velocity": lambda: self._of_fluid(self._velocity, "velocity"),
-            "speed": self._speed,
-            "ball_id": self._ball_id,
-        }
 
     def __getitem__(self, name: str) -> FloatArray:
         """A pass by its name."""
-        return self._makers[name]()
+        return _MAKERS[name](self)
 
     @cached_property
     def hit(self) -> BoolArray:
@@ -230,7 +217,7 @@ class PassImages:
     def _combined(self) -> FloatArray:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
         shown = self._fluid
-        rgba = np.zeros((*shown.shape, 4), np.float32) if self._backdrop is None else np.array(self._backdrop.rgba, order="C")
+        rgba = np.zeros((*shown.shape, 4), np.float32) if self._behind is None else np.array(self._behind.rgba, order="C")
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
         if not shown.any():
@@ -293,3 +280,21 @@ class PassImages:
         importance = spatial_importance(self._depth, self.hit, self._whole_camera, look.depth_contrast_radius)
         # Small changes are in proportion to the importance, great ones end at nothing and at twice the light: no halo glows.
         return np.asarray(1 + np.tanh(look.depth_contrast * importance), np.float32)
+
+
+_MAKERS: dict[str, Callable[[PassImages], FloatArray]] = {
+    "combined": lambda made: made._combined,
+    "depth": lambda made: made._depth,
+    "normal": lambda made: made._normal,
+    "position": lambda made: made._places["position"],
+    "vector": lambda made: made._places["vector"],
+    "alpha": lambda made: np.ascontiguousarray(made._combined[..., 3]),
+    "facing": lambda made: made._places["facing"],
+    "thickness": lambda made: made._length(),
+    "object_index": lambda made: made._object_index(),
+    "color": lambda made: made._colors(),
+    "velocity": lambda made: made._of_fluid(made._velocity, "velocity"),
+    "speed": lambda made: made._speed(),
+    "ball_id": lambda made: made._ball_id(),
+}
+"""How each pass is made."""

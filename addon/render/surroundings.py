@@ -32,7 +32,7 @@ class Backdrop:
     is_holdout
         (height, width): where what hides the fluid is not seen itself, and leaves the background of each pass.
     names, pass_indices
-        Of the objects.
+        Of the objects; none where there is no object at all.
     """
 
     rgba: FloatArray

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import bpy
 import numpy as np
-from event_loop import DEADLINE, wait_until
+from event_loop import DEADLINE, turns, wait_until
 from expected import FRAME, Caster, FloatArray, border_width, is_inner, nearest, srgb_bytes
 from fluid_scenes import read_balls
 from pictures import Picture, check_same
@@ -112,6 +112,8 @@ class FluidViews:
         settings = bpy.context.scene.meniscus
         settings.use_viewport = False
         try:
+            wait_until(lambda: not self.lives(), "a viewport without fluid")
+            turns(3)  # until that is on the screen
             wait_until(are_drawn, "the cube in EEVEE", 3 * DEADLINE)
         finally:
             settings.use_viewport = True

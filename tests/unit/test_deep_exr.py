@@ -89,7 +89,7 @@ def test_a_sample_reaches_from_front_to_back(balls):
 
 
 def test_what_hides_the_fluid_ends_its_samples(balls):
-    wall = replace(Backdrop.empty(CAMERA), depth=np.full((24, 32), 5.0, np.float32))
+    wall = replace(Backdrop.empty(CAMERA), depth=np.full((24, 32), 5.0, np.float32), names=("Wall",))
     deep = meniscus.render_deep(balls, CAMERA, FIELD, look=LOOKS["water"], backdrop=wall)
     whole = meniscus.render_deep(balls, CAMERA, FIELD, look=LOOKS["water"])
     assert deep.leave.max() <= 5.0 < whole.leave.max()

@@ -1,5 +1,7 @@
 """Passes: the fluid together with what else is in the scene."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -138,3 +140,16 @@ def test_lights_stand_in_world_space():
     # The surface is 1.5 units before the light and faces it.
     radiance = 100 / (4 * np.pi * 1.5**2) / np.pi
     np.testing.assert_allclose(pixel, [radiance, radiance / 2, 0, 1], rtol=1e-4)
+
+
+def test_images_are_given_back_at_once():
+    """Not only when Python looks for cycles, which may be many images later."""
+    gc.collect()
+    gc.disable()
+    try:
+        image = passes(wall(6.5))
+        seen = [weakref.ref(image[name]) for name in ("depth", "combined", "vector")]
+        del image
+        assert [reference() for reference in seen] == [None] * 3
+    finally:
+        gc.enable()

@@ -86,7 +86,7 @@ def test_thickness_ends_at_what_hides_the_fluid():
     from meniscus.addon.render.renderer import render
 
     view = camera()
-    backdrop = replace(Backdrop.empty(view), depth=np.full((33, 33), 4.8, np.float32))
+    backdrop = replace(Backdrop.empty(view), depth=np.full((33, 33), 4.8, np.float32), names=("Wall",))
     image = render(meniscus.Balls([(0, 0, 0)], R), view, FIELD, passes=("thickness",), backdrop=backdrop)
     assert image["thickness"][16, 16] == pytest.approx(0.3, abs=1e-5)
     assert not image["thickness"][0].any()
