@@ -25,6 +25,7 @@ def shade_image(
     materials: tuple[Material, ...],
     lighting: Lighting,
     contrast: FloatArray | None = None,
+    is_over_nothing: bool = False,
     threads: int = 0,
     watch: Callable[[float], None] = native.let_interrupt,
 ) -> None:
@@ -44,6 +45,8 @@ def shade_image(
         In world space.
     contrast
         (height, width): a factor of the light; None for 1.
+    is_over_nothing
+        Whether nothing is behind, whatever `rgba` holds.
     threads, watch
         As for :class:`method.Request`.
 
@@ -62,6 +65,7 @@ def shade_image(
             None if contrast is None else np.ascontiguousarray(contrast),
             native.view_tuple(camera),
             *_scene(materials, in_view),
+            is_over_nothing=is_over_nothing,
             threads=threads,
             watch=watch,
         )

@@ -37,7 +37,7 @@ NEEDED: dict[str, Attribute] = {
 
 
 # Passes that follow from where the surface lies, with the shape of their pixels.
-_PLACES: dict[str, tuple[int, ...]] = {"position": (3,), "facing": (), "vector": (4,)}
+_PLACES: dict[str, tuple[int, ...]] = {"position": (3,), "facing": (), "vector": (4,), "speed": ()}
 
 
 class PassImages:
@@ -91,11 +91,12 @@ class PassImages:
     @cached_property
     def objects(self) -> npt.NDArray[np.int32]:
         """(height, width): what is seen, an index into the names of the look's sources and then the backdrop's; -1: nothing."""
-        found = np.where(self._fluid, self._source, np.int32(-1))
-        others = self.hit & ~self._fluid
-        if self._backdrop is not None and others.any():
+        found = self._shown_source
+        if self._backdrop is not None:
+            others = self.hit & ~self._fluid
+            found = found.copy()
             found[others] = self._backdrop.object[others] + len(self._sources)
-        return np.asarray(found, np.int32)
+        return found
 
     @cached_property
     def _is_before(self) -> BoolArray:
@@ -121,6 +122,11 @@ class PassImages:
         if balls.sources is None or ball is None or not len(balls):
             return np.broadcast_to(np.int32(0), self._surface.depth.shape)
         return np.asarray(balls.sources[np.maximum(ball, 0)], np.int32)
+
+    @cached_property
+    def _shown_source(self) -> npt.NDArray[np.int32]:
+        """The same, -1 where no fluid shows itself."""
+        return np.where(self._fluid, self._source, np.int32(-1))
 
     def _of_fluid(self, values: FloatArray, name: str) -> FloatArray:
         """The values of fluid that shows itself, else the pass's background."""
@@ -156,7 +162,7 @@ class PassImages:
             core.place(
                 self._depth,
                 self._normal,
-                self._of_fluid(self._velocity, "velocity") if "vector" in images else None,
+                None if self._surface.velocity is None else self._of_fluid(self._velocity, "velocity"),
                 *(images.get(name) for name in _PLACES),
                 background=DEPTH_BACKGROUND,
                 view=native.view_tuple(request.camera),
@@ -186,10 +192,6 @@ class PassImages:
         colors = np.where(self._surface.hit[..., None], self._color, np.float32(0))
         return self._of_objects("color", colors, lambda backdrop: backdrop.color)
 
-    def _speed(self) -> FloatArray:
-        velocity = self._velocity
-        return self._of_fluid(np.sqrt(np.einsum("ijk,ijk->ij", velocity, velocity)), "speed")
-
     def _length(self) -> FloatArray:
         request = self._request
         hit = self._surface.hit
@@ -201,30 +203,46 @@ class PassImages:
     def _object_index(self) -> FloatArray:
         numbers = [source.pass_index for source in self._sources]
         numbers += self._backdrop.pass_indices if self._backdrop is not None else ()
-        # The last number, which -1 takes, is that of nothing.
-        return np.array([*numbers, 0], np.float32)[self.objects]
+        return self._labelled(self.objects, np.array(numbers, np.float32), 0.0)
 
     def _ball_id(self) -> FloatArray:
-        ball, ids = self._surface.ball, self._request.balls.ids
+        balls, ball, background = self._request.balls, self._surface.ball, PASSES["ball_id"].background
         if ball is None:
-            return np.full(self.hit.shape, PASSES["ball_id"].background, np.float32)
-        numbers = ball.astype(np.float32)
-        if ids is not None:
-            numbers[self._surface.hit] = ids[ball[self._surface.hit]]
-        return self._of_fluid(numbers, "ball_id")
+            return np.full(self.hit.shape, background, np.float32)
+        table = np.arange(len(balls), dtype=np.float32) if balls.ids is None else balls.ids.astype(np.float32)
+        return self._of_fluid(self._labelled(ball, table, background), "ball_id")
+
+    def _labelled(self, index: npt.NDArray[np.int32], table: FloatArray, background: float) -> FloatArray:
+        """(height, width): the number in a table that each pixel's index stands for, the background where it is negative."""
+        image = np.empty(index.shape, np.float32)
+        height, width = index.shape
+        core, request = native.load(), self._request
+        with native.translated_errors():
+            core.label(
+                np.ascontiguousarray(index),
+                table,
+                image,
+                background=background,
+                width=width,
+                height=height,
+                threads=request.threads,
+                watch=request.watch,
+            )
+        return image
 
     @cached_property
     def _combined(self) -> FloatArray:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
-        shown = self._fluid
-        rgba = np.zeros((*shown.shape, 4), np.float32) if self._behind is None else np.array(self._behind.rgba, order="C")
+        shown, uses_scene = self._fluid, LOOK_STYLES[self._look.style].uses_scene
+        if self._behind is not None:
+            rgba = np.array(self._behind.rgba, order="C")
+        else:
+            rgba = (np.empty if uses_scene else np.zeros)((*shown.shape, 4), np.float32)
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
-        if not shown.any():
-            return rgba
-        if LOOK_STYLES[self._look.style].uses_scene:
+        if uses_scene:
             self._shade_materials(rgba)
-        else:
+        elif shown.any():
             balls, camera = self._request.balls, self._request.camera
             ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
             rgba[shown] = shaded(self._points(shown), self._look, ranges).over(rgba[shown])
@@ -238,13 +256,14 @@ class PassImages:
             surface.depth,
             surface.normal,
             self._color,
-            np.where(self._fluid, self._source, np.int32(-1)),
+            self._shown_source,
             request.camera,
             tuple(source.material for source in self._sources),
             self._look.lighting,
             self._contrast,
-            request.threads,
-            request.watch,
+            is_over_nothing=self._behind is None,
+            threads=request.threads,
+            watch=request.watch,
         )
 
     def _points(self, shown: BoolArray) -> SurfacePoints:
@@ -294,7 +313,7 @@ _MAKERS: dict[str, Callable[[PassImages], FloatArray]] = {
     "object_index": lambda made: made._object_index(),
     "color": lambda made: made._colors(),
     "velocity": lambda made: made._of_fluid(made._velocity, "velocity"),
-    "speed": lambda made: made._speed(),
+    "speed": lambda made: made._places["speed"],
     "ball_id": lambda made: made._ball_id(),
 }
 """How each pass is made."""

@@ -105,6 +105,9 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "triangle": lambda sizes: array("i4", 0, 1, sizes.height, sizes.width),
     "rgba": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width, 4),
     "vector": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width, 4),
+    "speed": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width),
+    "table": lambda sizes: array("f4", 0, 9, 10),
+    "image": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width),
     "facing": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width),
     "contrast": lambda sizes: st.none() | array("f4", 0, 1, sizes.height, sizes.width),
     "color": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width, 3),
@@ -125,7 +128,7 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
-FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves")
+FLAGS = ("is_perspective", "is_over_nothing", "overlapping", "fits", "tightens", "discards", "proves")
 FITTING["coefficients"] = FITTING["kernel"]
 FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}

@@ -9,6 +9,9 @@ pub use crate::tile_caster::View;
 /// Rows that a thread fills at a time.
 const ROWS: usize = 8;
 
+/// Pixels that a thread labels at a time.
+const LABELS: usize = 1 << 14;
+
 /// An image of a surface, row 0 at the bottom.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
@@ -42,6 +45,8 @@ pub struct Places<'a> {
     pub facing: &'a mut [f32],
     /// Pixels: where the point was less where it is, then where it is less where it will be.
     pub vector: &'a mut [[f32; 4]],
+    /// Length of the velocity.
+    pub speed: &'a mut [f32],
 }
 
 /// Fills the images of a surface that a view sees.
@@ -54,18 +59,42 @@ pub fn place(view: &View, surface: Surface<'_>, motion: Motion<'_>, places: Plac
     }
     let pixels = view.width * view.height;
     let fits = |count: usize| [0, pixels].contains(&count);
-    let Places { position, facing, vector } = places;
-    let sizes_fit = [position.len(), facing.len(), vector.len(), surface.velocity.len()].into_iter().all(fits);
+    let Places { position, facing, vector, speed } = places;
+    let sizes_fit = [position.len(), facing.len(), vector.len(), speed.len(), surface.velocity.len()].into_iter().all(fits);
     if !sizes_fit || surface.depth.len() != pixels || surface.normal.len() != pixels {
         return Err(Error::InvalidInput("the images must have the size of the camera's".into()));
     }
     let chunk = ROWS * view.width;
-    job.expect(3 * view.height.div_ceil(ROWS));
+    job.expect(4 * view.height.div_ceil(ROWS));
     let placing = Placing { view, surface, motion };
     // One image after the other: each is written in order.
     fill(position, chunk, job, |pixel| placing.position(pixel).map_or([0.0; 3], |point| point.map(|part| part as f32)))?;
     fill(facing, chunk, job, |pixel| placing.facing(pixel))?;
-    fill(vector, chunk, job, |pixel| placing.vector(pixel))
+    fill(vector, chunk, job, |pixel| placing.vector(pixel))?;
+    fill(speed, chunk, job, |pixel| {
+        let [x, y, z] = surface.velocity.get(pixel).copied().unwrap_or_default();
+        (x * x + y * y + z * z).sqrt()
+    })
+}
+
+/// Gives each pixel the number of its ball from a table, or `background` where there is no ball.
+///
+/// # Errors
+/// `InvalidInput` where sizes differ or a ball has no number, `Cancelled`.
+pub fn label(ball: &[i32], table: &[f32], background: f32, image: &mut [f32], job: &Job) -> Result<()> {
+    if ball.len() != image.len() {
+        return Err(Error::InvalidInput("the images must have the same size".into()));
+    }
+    job.expect(image.len().div_ceil(LABELS));
+    image.par_chunks_mut(LABELS).zip(ball.par_chunks(LABELS)).try_for_each(|(image, ball)| {
+        for (target, ball) in image.iter_mut().zip(ball) {
+            *target = match usize::try_from(*ball) {
+                Ok(index) => *table.get(index).ok_or_else(|| Error::InvalidInput("a ball has no number".into()))?,
+                Err(_) => background,
+            };
+        }
+        job.advance(1)
+    })
 }
 
 fn fill<T: Send>(image: &mut [T], chunk: usize, job: &Job, value: impl Fn(usize) -> T + Sync) -> Result<()> {
@@ -175,8 +204,8 @@ mod tests {
         for is_perspective in [true, false] {
             let cameras = [view(is_perspective, 0.0), view(is_perspective, -0.1), view(is_perspective, 0.3)];
             let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity };
-            let (mut position, mut facing, mut vector) = ([[9.0; 3]; 8], [9.0; 8], [[9.0; 4]; 8]);
-            let places = Places { position: &mut position, facing: &mut facing, vector: &mut vector };
+            let (mut position, mut facing, mut vector, mut speed) = ([[9.0; 3]; 8], [9.0; 8], [[9.0; 4]; 8], [9.0; 8]);
+            let places = Places { position: &mut position, facing: &mut facing, vector: &mut vector, speed: &mut speed };
             let motion = Motion { previous: &cameras[1], following: &cameras[2], seconds: 0.5 };
             place(&cameras[0], surface, motion, places, &Job::default()).unwrap();
             // The pixel's centre is (0.25, 0.25) in the window, a pixel is 0.5 wide.
@@ -187,6 +216,7 @@ mod tests {
             let expected = [(-0.5 + 0.1), -0.25, -(0.5 - 0.3), -0.25].map(|moved| (moved / f64::from(scale) / 0.5) as f32);
             assert!(vector[6].iter().zip(expected).all(|(a, e)| (a - e).abs() < 1e-6), "{:?} {expected:?}", vector[6]);
             assert_eq!((position[0], facing[0], vector[0]), ([0.0; 3], 0.0, [0.0; 4]));
+            assert_eq!(speed[6], 1.25f32.sqrt());
         }
     }
 
@@ -196,7 +226,7 @@ mod tests {
         let camera = view(true, 0.0);
         let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity };
         let mut vector = [[9.0; 4]; 8];
-        let places = Places { position: &mut [], facing: &mut [], vector: &mut vector };
+        let places = Places { position: &mut [], facing: &mut [], vector: &mut vector, speed: &mut [] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
         place(&camera, surface, motion, places, &Job::default()).unwrap();
         assert_eq!(vector[0][..2], [0.0; 2]);
@@ -204,11 +234,20 @@ mod tests {
     }
 
     #[test]
+    fn labels_are_those_of_the_table() {
+        let mut image = [9.0; 4];
+        label(&[1, -1, 0, 1], &[5.0, 7.0], -3.0, &mut image, &Job::default()).unwrap();
+        assert_eq!(image, [7.0, -3.0, 5.0, 7.0]);
+        assert!(label(&[2], &[5.0, 7.0], 0.0, &mut [0.0], &Job::default()).is_err());
+        assert!(label(&[0], &[5.0], 0.0, &mut [], &Job::default()).is_err());
+    }
+
+    #[test]
     fn sizes_must_fit() {
         let camera = view(true, 0.0);
         let surface = Surface { depth: &[1.0; 8], background: 1e10, normal: &[[0.0; 3]; 8], velocity: &[] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
-        let places = Places { position: &mut [], facing: &mut [0.0; 7], vector: &mut [] };
+        let places = Places { position: &mut [], facing: &mut [0.0; 7], vector: &mut [], speed: &mut [] };
         assert!(place(&camera, surface, motion, places, &Job::default()).is_err());
     }
 }

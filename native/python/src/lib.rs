@@ -22,7 +22,7 @@ mod meniscus_native {
     #[pymodule_export]
     use super::rasterizer::rasterize;
     #[pymodule_export]
-    use super::shading::{place, shade_image, shade_points};
+    use super::shading::{label, place, shade_image, shade_points};
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
 

@@ -21,9 +21,11 @@ type LightArguments = (String, [f32; 3], [f32; 3], [f32; 3], f32, [f32; 2]);
 ///
 /// rgba (height, width, 4): premultiplied, what is behind, then what is seen. depth (height, width), normal (height, width, 3)
 /// in world space, color (height, width, 3): float32. material (height, width) int32: index, negative where nothing is shaded.
-/// contrast (height, width) float32: factor of the light, or None. Lights are in view space, z to the eye.
+/// contrast (height, width) float32: factor of the light, or None. Lights are in view space, z to the eye. is_over_nothing: that
+/// nothing is behind, whatever rgba holds.
 #[pyfunction]
-#[pyo3(signature = (rgba, depth, normal, color, material, contrast, view, materials, lights, world, threads=0, watch=None))]
+#[pyo3(signature = (rgba, depth, normal, color, material, contrast, view, materials, lights, world, is_over_nothing=false,
+                    threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn shade_image(
     python: Python<'_>,
@@ -37,6 +39,7 @@ pub fn shade_image(
     materials: Vec<MaterialArguments>,
     lights: Vec<LightArguments>,
     world: [f32; 3],
+    is_over_nothing: bool,
     threads: usize,
     watch: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<()> {
@@ -57,6 +60,7 @@ pub fn shade_image(
         material: material.numbers(),
         contrast: contrast.as_ref().map_or(&[], |contrast| contrast.numbers()),
         rgba: rgba.numbers().map_err(python_error)?.as_chunks_mut().0,
+        is_over_nothing,
     };
     let path = Path::chosen().map_err(python_error)?;
     run(python, threads, watch, |job| shading::shade_image(path, &view, &scene, image, job))
@@ -105,9 +109,9 @@ pub fn shade_points(
 /// Fills what follows from where the surface of an image lies; what is None is left out.
 ///
 /// depth (height, width), normal (height, width, 3) and velocity (height, width, 3) or None: float32, world space. position
-/// (height, width, 3), facing (height, width), vector (height, width, 4): float32, to be written.
+/// (height, width, 3), facing (height, width), vector (height, width, 4), speed (height, width): float32, to be written.
 #[pyfunction]
-#[pyo3(signature = (depth, normal, velocity, position, facing, vector, *, background, view, previous, following, seconds,
+#[pyo3(signature = (depth, normal, velocity, position, facing, vector, speed, *, background, view, previous, following, seconds,
                     threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn place(
@@ -118,6 +122,7 @@ pub fn place(
     position: Option<&Bound<'_, PyAny>>,
     facing: Option<&Bound<'_, PyAny>>,
     vector: Option<&Bound<'_, PyAny>>,
+    speed: Option<&Bound<'_, PyAny>>,
     background: f32,
     view: ViewArguments,
     previous: ViewArguments,
@@ -134,6 +139,7 @@ pub fn place(
     let mut position = position.map(|image| Pixels::<f32, 3>::borrow("position", image, size)).transpose()?;
     let mut facing = facing.map(|image| Pixels::<f32, 1>::borrow("facing", image, size)).transpose()?;
     let mut vector = vector.map(|image| Pixels::<f32, 4>::borrow("vector", image, size)).transpose()?;
+    let mut speed = speed.map(|image| Pixels::<f32, 1>::borrow("speed", image, size)).transpose()?;
     let surface = Surface {
         depth: depth.numbers(),
         background,
@@ -144,9 +150,35 @@ pub fn place(
         position: written(&mut position)?.as_chunks_mut().0,
         facing: written(&mut facing)?,
         vector: written(&mut vector)?.as_chunks_mut().0,
+        speed: written(&mut speed)?,
     };
     let motion = Motion { previous: &previous, following: &following, seconds };
     run(python, threads, watch, |job| placing::place(&view, surface, motion, places, job))
+}
+
+/// Gives each pixel the number of its ball.
+///
+/// ball (height, width) int32: index, negative for none; table (N,) float32: the number of each ball. image (height, width)
+/// float32: to be written, background where there is no ball.
+#[pyfunction]
+#[pyo3(signature = (ball, table, image, *, background, width, height, threads=0, watch=None))]
+#[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
+pub fn label(
+    python: Python<'_>,
+    ball: &Bound<'_, PyAny>,
+    table: &Bound<'_, PyAny>,
+    image: &Bound<'_, PyAny>,
+    background: f32,
+    width: usize,
+    height: usize,
+    threads: usize,
+    watch: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    let ball = ReadPixels::<i32, 1>::borrow("ball", ball, [width, height])?;
+    let table = Rows::<f32, 1>::borrow("table", table)?;
+    let mut image = Pixels::<f32, 1>::borrow("image", image, [width, height])?;
+    let (ball, table, image) = (ball.numbers(), table.numbers(), image.numbers().map_err(python_error)?);
+    run(python, threads, watch, |job| placing::label(ball, table, background, image, job))
 }
 
 fn written<'a, const C: usize>(image: &'a mut Option<Pixels<'_, f32, C>>) -> PyResult<&'a mut [f32]> {

@@ -58,6 +58,8 @@ pub struct Image<'a> {
     pub contrast: &'a [f32],
     /// Premultiplied: what is behind, then what is seen.
     pub rgba: &'a mut [[f32; 4]],
+    /// Whether there is nothing behind, whatever `rgba` holds.
+    pub is_over_nothing: bool,
 }
 
 /// Points to be shaded: positions, unit normals, and unit directions to the eye, which the normals face.
@@ -88,9 +90,12 @@ pub fn shade_image(path: Path, view: &View, scene: &Scene<'_>, image: Image<'_>,
     }
     check_materials(scene, image.material)?;
     job.expect(view.height);
-    let Image { depth, normal, color, material, contrast, rgba } = image;
+    let Image { depth, normal, color, material, contrast, rgba, is_over_nothing } = image;
     rgba.par_chunks_mut(view.width).enumerate().try_for_each(|(row, rgba)| {
         let line = row * view.width..(row + 1) * view.width;
+        if is_over_nothing {
+            rgba.fill([0.0; 4]);
+        }
         path.dispatch(RowTask {
             view,
             scene,

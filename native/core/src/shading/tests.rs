@@ -106,6 +106,7 @@ fn images_are_laid_over_what_is_behind() {
             material: &material,
             contrast: &vec![0.5; width],
             rgba: &mut rgba,
+            is_over_nothing: false,
         };
         shade_image(path, &view(width), &scene, image, &Job::default()).unwrap();
         for (column, pixel) in rgba.iter().enumerate() {
@@ -121,6 +122,24 @@ fn images_are_laid_over_what_is_behind() {
             }
         }
     }
+}
+
+#[test]
+fn over_nothing_what_was_there_does_not_count() {
+    let materials = [DULL];
+    let scene = Scene::new(&materials, &[], [0.5; 3]).unwrap();
+    let mut rgba = [[9.0; 4]; 2];
+    let image = Image {
+        depth: &[1.0; 2],
+        normal: &[[0.0, 0.0, -1.0]; 2],
+        color: &[[1.0; 3]; 2],
+        material: &[0, -1],
+        contrast: &[],
+        rgba: &mut rgba,
+        is_over_nothing: true,
+    };
+    shade_image(Path::Portable, &view(2), &scene, image, &Job::default()).unwrap();
+    assert_eq!(rgba, [[0.5, 0.5, 0.5, 1.0], [0.0; 4]]);
 }
 
 #[test]
