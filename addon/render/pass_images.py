@@ -119,7 +119,7 @@ class PassImages:
     def _source(self) -> npt.NDArray[np.int32]:
         """Index of the object that the dominant ball comes from; 0 where there is no fluid."""
         balls, ball = self._request.balls, self._surface.ball
-        if balls.sources is None or ball is None or not len(balls):
+        if len(self._sources) == 1 or balls.sources is None or ball is None or not len(balls):
             return np.broadcast_to(np.int32(0), self._surface.depth.shape)
         return np.asarray(balls.sources[np.maximum(ball, 0)], np.int32)
 
