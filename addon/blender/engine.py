@@ -1,4 +1,4 @@
-"""The render engine: F12 and animations of the fluid."""
+"""The render engine: F12, animations and Rendered viewports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .engine_name import ENGINE
 from .preferences import backend_of, threads_of
 from .read_materials import read_lighting
 from .read_meshes import read_meshes
-from .render_scene import Control, RenderSettings, read_scene
+from .render_scene import Control, RenderSettings, read_view_layer
 from .rendered_view import RenderedMeshes, view_matrices
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 from .viewport import draw_in_engine
@@ -111,7 +111,7 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             resolution=(self.resolution_x, self.resolution_y),
         )
         self._show_progress(0.0, "Reading the scene")
-        read = read_scene(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
+        read = read_view_layer(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
         image = read.image(Control(self.test_break, self._show_progress))
         if image.info.dropped_text:
             self.report({"WARNING"}, image.info.dropped_text)

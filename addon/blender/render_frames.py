@@ -28,7 +28,7 @@ from ..output.file_names import ended, frame_path, pass_pattern
 from ..output.whole_file import prepare_place
 from ..render.method import timed
 from .preview import write_png
-from .render_scene import Control, RenderSettings, SceneRender, read_scene
+from .render_scene import Control, RenderSettings, SceneRender, read_view_layer
 
 LAYOUTS = {
     "MULTILAYER": "One file a frame, all passes in one part: any program reads it",
@@ -153,21 +153,30 @@ class FrameWork:
 
     def take(self) -> bool:
         """Claim the frame's files where that is asked for; False where there is nothing to do."""
-        job = self.job
         for path in self.paths.values():
             remove_leftovers(path)
-        if not job.use_overwrite and all(map(is_taken, self.paths.values())):
-            self.report.was_there = True
-        elif job.use_placeholders:
-            self.report.was_there = not all(claim(path) for path in self.paths.values() if not is_taken(path))
+        if not self.job.use_overwrite:
+            self.paths = {content: path for content, path in self.paths.items() if not is_taken(path)}
+        self.report.was_there = not self.paths or not self._claim()
         return not self.report.was_there
+
+    def _claim(self) -> bool:
+        """Put placeholders where there are no files; False where another process was quicker."""
+        if not self.job.use_placeholders or all(claim(path) for path in self.paths.values() if not is_taken(path)):
+            return True
+        self._give_up()
+        return False
+
+    def _give_up(self) -> None:
+        for path in self.paths.values():
+            give_up(path)
 
     def read(self) -> None:
         """Bring the scene to the frame and read it: on Blender's own thread."""
         milliseconds: dict[str, float] = {}
         with timed(milliseconds, "scene"):
             self._set_frame(self.report.frame, 0.0)
-        self._read = read_scene(self.job.view_layer.depsgraph, self.job.settings, self._set_frame)
+        self._read = read_view_layer(self.job.view_layer.depsgraph, self.job.settings, self._set_frame)
         self._read.milliseconds.update({**milliseconds, **self._read.milliseconds})
 
     def render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
@@ -190,7 +199,7 @@ class FrameWork:
         if job.use_preview:
             self._picture = image["combined"]
         contents = [(name, self._flat(image, name)) for name in self.paths if name != "deep"]
-        if job.use_deep:
+        if "deep" in self.paths:
             deep = self._read.deep_image(control)
             image.info.milliseconds["spans"] = deep.info.milliseconds["spans"]
             contents.append(("deep", deep_content(deep, self._options(_deep_compression(job.compression)))))
@@ -219,8 +228,7 @@ class FrameWork:
         """Note what went wrong, and leave the frame to others."""
         self.report.error = str(error)
         self.report.is_last = isinstance(error, FullDiskError)
-        for path in self.paths.values():
-            give_up(path)
+        self._give_up()
 
     def _set_frame(self, frame: int, subframe: float) -> None:
         self.job.scene.frame_set(frame, subframe=subframe)

@@ -131,7 +131,7 @@ class _Moment:
 
 @dataclass(frozen=True)
 class SceneRender:
-    """A view layer at one frame, read and ready to be rendered on any thread. Made by :func:`read_scene`.
+    """A view layer at one frame, read and ready to be rendered on any thread. Made by :func:`read_view_layer`.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ class SceneRender:
             yield from ((number, moment) for number in range(step, self.settings.samples, len(self.shutter)))
 
 
-def read_scene(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, set_frame: SetFrame) -> SceneRender:
+def read_view_layer(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, set_frame: SetFrame) -> SceneRender:
     """Read a view layer at the frame that its dependency graph has, with the scene's own look.
 
     Motion blur and the motion of the camera take the dependency graph to other times, and back.

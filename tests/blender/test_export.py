@@ -88,6 +88,13 @@ def test_files_that_are_there_stay(scene, run, tmp_path):
     assert "wrote 3 of 3 frames" in run("--output", "//####.exr", "--overwrite")[1]
 
 
+def test_only_what_is_missing_of_a_frame_is_written(scene, run, tmp_path):
+    (tmp_path / "f_0001.exr").write_bytes(b"whole")
+    assert run("--output", "//f_####.exr", "--frames", "1", "--deep", "--no-overwrite", "--placeholders")[0] == 0
+    assert (tmp_path / "f_0001.exr").read_bytes() == b"whole"
+    assert (tmp_path / "f_deep_0001.exr").stat().st_size > 100
+
+
 def test_steps_of_the_scene_count(scene, run, tmp_path):
     scene.frame_end, scene.frame_step = 7, 3
     assert run("--output", "//####.exr")[0] == 0
@@ -211,3 +218,31 @@ def test_the_farm_example_splits_a_range_over_processes(scene, meniscus, tmp_pat
     arguments = ["--blender", bpy.app.binary_path, "--workers", "2", "--chunk", "2", str(tmp_path / "scene.blend")]
     assert farm.main([*arguments, "--frames", "1:4", "--", "--output", str(tmp_path / "####.exr")]) == 0
     assert names(tmp_path) == ["0001.exr", "0002.exr", "0003.exr", "0004.exr"]
+
+
+def test_a_cancelled_export_keeps_what_is_whole(meniscus, scene, tmp_path):
+    package = f"{meniscus.__name__}.addon.blender"
+    modules = {name: importlib.import_module(f"{package}.{name}") for name in ("export", "render_frames", "render_scene")}
+    job = modules["render_frames"].RenderJob(
+        scene=scene,
+        view_layer=scene.view_layers[0],
+        settings=modules["render_scene"].RenderSettings(passes=("depth",)),
+        frames=tuple(range(1, 500)),
+        output=str(tmp_path / "####.exr"),
+        passes=("depth",),
+        use_overwrite=False,
+        use_placeholders=True,
+    )
+    scene.frame_set(3)
+    run = modules["export"]._Run(job)
+    while not run.reports:
+        assert run.advance()
+    run.cancel()
+    run.to_the_end()
+    run.close()
+    kind, sentence = run.outcome
+    assert kind == "WARNING"
+    assert sentence.startswith("Cancelled: Meniscus wrote ")
+    assert 1 <= len(names(tmp_path)) < 499
+    assert all((tmp_path / name).read_bytes()[:4] == b"\x76\x2f\x31\x01" for name in names(tmp_path))
+    assert scene.frame_current == 3

@@ -93,3 +93,25 @@ def settled_picture(window, region):
     region.tag_redraw()
     turns(8)
     return region_picture(window, region)
+
+
+def test_escape_ends_an_export(fluid, drop, tmp_path):
+    """Frames are written while Blender goes on; what was begun becomes whole, and the scene has its frame again."""
+    scene = bpy.context.scene
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = 5000, 64, 48
+    scene.frame_set(7)
+
+    def written():
+        return sorted(path.name for path in tmp_path.iterdir() if path.suffix == ".exr" and not path.name.startswith("."))
+
+    with drop.override():
+        assert bpy.ops.meniscus.export_passes("EXEC_DEFAULT", filepath=str(tmp_path / "####.exr")) == {"RUNNING_MODAL"}
+    wait_until(lambda: len(written()) >= 3, "three frames")
+    act("key", "Escape")
+    wait_until(lambda: scene.frame_current == 7, "the end of the export")
+    found = written()
+    assert len(found) < 5000
+    turns(20)
+    assert written() == found
+    assert all((tmp_path / name).read_bytes()[:4] == b"\x76\x2f\x31\x01" for name in found)
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
