@@ -83,7 +83,8 @@ def test_memory_stays_flat(fluid, drop):
     own = growth_without_fluid(small) if gpu.platform.backend_type_get() == "VULKAN" else [0.0]
     settings.use_fluid = True
     blocks = growth_of_orbiting(small, REDRAWS)
-    growth = REDRAWS * (np.median(blocks) - np.median(own))
+    # At first Blender's pools fill; what leaks goes on.
+    growth = REDRAWS * (np.median(blocks[len(blocks) // 2 :]) - np.median(own))
     assert growth < MOST_GROWTH, f"{growth:.1f} MB more after {REDRAWS} redraws: {blocks}, without fluid {own}"
     fluid.check_presence("after_many_redraws", small)
 
