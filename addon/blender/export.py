@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 from typing import ClassVar
@@ -10,7 +11,7 @@ from typing import ClassVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..fluid.errors import CancelledError, MeniscusError
+from ..fluid.errors import CancelledError, InputError, MeniscusError
 from ..output.exr_content import COMPRESSIONS
 from .output_pattern import output_pattern
 from .preferences import backend_of, threads_of
@@ -30,6 +31,10 @@ _LAYOUTS = [
     for name, label in (("MULTILAYER", "Multilayer"), ("MULTIPART", "Multi-Part"), ("PASSES", "Files"))
 ]
 _COMPRESSIONS = [(name, name.title(), text) for name, text in COMPRESSIONS.items()]
+
+
+_running: list[_Run] = []
+"""The export that is on its way, if there is one."""
 
 
 class MENISCUS_OT_export_passes(bpy.types.Operator):
@@ -65,6 +70,9 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
         if not has_sources(context.scene):
             cls.poll_message_set("The scene has no fluid: use an object as fluid first")
             return False
+        if _running:
+            cls.poll_message_set("Another export is running: wait for it, or cancel it by Escape")
+            return False
         return True
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Result:
@@ -87,7 +95,13 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
         manager.progress_begin(0, len(job.frames))
         self._timer = manager.event_timer_add(_TICK, window=context.window)
         manager.modal_handler_add(self)
+        _running.append(self._run)
         return {"RUNNING_MODAL"}
+
+    def cancel(self, _context: bpy.types.Context) -> None:
+        """Blender ends the export, because another file is opened."""
+        self._run.cancel()
+        self._end()
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC" and event.value == "PRESS":
@@ -106,10 +120,15 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
             context.window_manager.event_timer_remove(self._timer)
             context.window_manager.progress_end()
             context.workspace.status_text_set(None)
-        self._run.close()
+        self._end()
         kind, sentence = self._run.outcome
         self.report({kind}, sentence)
         return {"CANCELLED"} if kind == "ERROR" else {"FINISHED"}
+
+    def _end(self) -> None:
+        self._run.close()
+        if self._run in _running:
+            _running.remove(self._run)
 
     def _job(self, context: bpy.types.Context) -> RenderJob:
         scene, view_layer = context.scene, context.view_layer
@@ -157,14 +176,21 @@ class _Run:
 
     def advance(self) -> bool:
         """Go on where that does not keep Blender waiting for long; False when all is done."""
-        if self._rendering is not None and not self._rendering.done():
-            return True
+        if self._rendering is not None:
+            if not self._rendering.done():
+                return True
+            if failure := self._rendering.exception():
+                self._failure = MeniscusError(f"Meniscus failed unexpectedly ({failure}): please report it")
+                return False
         try:
             step = next(self._steps)
         except StopIteration:
             return False
         except MeniscusError as error:
             self._failure = error
+            return False
+        except ReferenceError:
+            self._failure = InputError("The scene that was exported is not there any more, after undo too: export it again")
             return False
         if isinstance(step, FrameReport):
             self.reports.append(step)
@@ -176,12 +202,14 @@ class _Run:
         """Go on until all is done."""
         while self.advance():
             if self._rendering is not None:
-                self._rendering.result()
+                wait([self._rendering])
 
     def close(self) -> None:
-        """End the thread, and bring the scene back to the frame that it had."""
+        """End the thread, and bring the scene back to the frame that it had, where it is still there."""
         self._thread.shutdown()
-        self._job.scene.frame_set(self._frame)
+        self._steps.close()
+        with suppress(ReferenceError):
+            self._job.scene.frame_set(self._frame)
 
     @property
     def progress_text(self) -> str:

@@ -7,7 +7,7 @@ their own while the next frame is rendered.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -273,7 +273,7 @@ def render_frames(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[
             step()
 
 
-def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[FrameReport | Callable[[], None]]:
+def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[FrameReport | Callable[[], None], None, None]:
     """As :func:`render_frames`, but gives the rendering of each frame to the caller, who may do it on another thread.
 
     It is to be taken on Blender's own thread, and further only when the last function that it gave has been called.
@@ -293,6 +293,9 @@ def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[Fr
                     yield partial(work.render, writer, is_cancelled)
                     work.check()
                     is_first = False
+            except GeneratorExit:
+                underway.pop().fail(CancelledError("The render was given up"))
+                raise
             except CancelledError as error:
                 underway.pop().fail(error)
                 yield from (begun.finish() for begun in underway)

@@ -115,3 +115,23 @@ def test_escape_ends_an_export(fluid, drop, tmp_path):
     assert written() == found
     assert all((tmp_path / name).read_bytes()[:4] == b"\x76\x2f\x31\x01" for name in found)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_another_file_ends_an_export(fluid, drop, tmp_path):
+    """Without claims left behind, and another one can begin."""
+    scene = bpy.context.scene
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = 5000, 64, 48
+    scene.render.use_overwrite, scene.render.use_placeholder = False, True
+    with drop.override():
+        assert bpy.ops.meniscus.export_passes("EXEC_DEFAULT", filepath=str(tmp_path / "####.exr")) == {"RUNNING_MODAL"}
+        assert not bpy.ops.meniscus.export_passes.poll()
+    wait_until(lambda: len(list(tmp_path.glob("0*.exr"))) >= 3, "three frames")
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    turns(5)
+    found = sorted(tmp_path.iterdir())
+    assert 2 <= len(found) < 5000
+    assert all(path.read_bytes()[:4] == b"\x76\x2f\x31\x01" for path in found)
+    turns(20)
+    assert sorted(tmp_path.iterdir()) == found
+    add_points(bpy.context.scene.collection, "Drop", [(0, 0, 0)], radius=1.0)
+    assert bpy.ops.meniscus.export_passes.poll()
