@@ -10,7 +10,7 @@ from bpy.props import EnumProperty
 
 from ... import __version__
 from ..fluid.errors import MeniscusError
-from .compositing import MERGES, add_compositing, fluid_scene_of
+from .compositing import MERGES, add_compositing, drawn_twice, fluid_scene_of
 from .engine_name import ENGINE
 from .presets import PRESETS, apply_preset
 from .sources import active_source, has_sources, problem_of, use_as_fluid, use_no_more
@@ -148,7 +148,8 @@ class MENISCUS_OT_copy_problem(bpy.types.Operator):
 
 
 class MENISCUS_OT_add_compositing(bpy.types.Operator):
-    """Render the fluid in a scene of its own, and lay it over this one in the compositor; other nodes stay as they are"""
+    """Render the fluid in a scene of its own, and lay it over this one in the compositor; other nodes stay as they are.
+    Objects that are nothing but fluid lose their ray visibility"""
 
     bl_idname = "meniscus.add_compositing"
     bl_label = "Composite Fluid over Scene"
@@ -176,6 +177,9 @@ class MENISCUS_OT_add_compositing(bpy.types.Operator):
         except MeniscusError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if names := ", ".join(f"'{name}'" for name in drawn_twice(context.scene)):
+            problem = f"This scene's engine still draws {names} in the place of the fluid: have particles rendered as None"
+            self.report({"WARNING"}, problem)
         self.report({"INFO"}, f"Renders now lay the fluid of '{fluid.name}' over this scene")
         return {"FINISHED"}
 

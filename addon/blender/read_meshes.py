@@ -60,8 +60,11 @@ def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Objec
     if instance.particle_system is not None:
         return bool(settings_of(instance.parent, depsgraph).use_fluid)
     settings = settings_of(item, depsgraph)
-    if not settings.use_fluid:
-        return False
+    return bool(settings.use_fluid) and fluid_replaces_surface(item, settings)
+
+
+def fluid_replaces_surface(item: bpy.types.Object, settings: bpy.types.PropertyGroup) -> bool:
+    """Whether the fluid of a source, with the given ``meniscus`` properties, takes the place of its own surface."""
     is_domain = any(modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" for modifier in item.modifiers)
     has_particles = any(system.settings.type != "HAIR" for system in item.particle_systems)
     return is_domain or settings.source == "POINTS" or not has_particles

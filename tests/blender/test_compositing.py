@@ -187,6 +187,7 @@ def _state():
         sorted(bpy.data.scenes.keys()),
         sorted(bpy.data.node_groups.keys()),
         scene.view_layers[0].use_pass_z,
+        sorted((item.name, item.visible_camera, item.visible_shadow) for item in scene.objects),
         bpy.app.version < (5, 0) and scene.use_nodes,
         sorted(node.name for node in tree.nodes) if tree is not None else None,
         sorted((link.from_node.name, link.to_node.name) for link in tree.links) if tree is not None else None,
@@ -212,3 +213,145 @@ def test_instances_hide_fluid_too(meniscus, scene, rendered):
     bpy.ops.meniscus.add_compositing()
     errors = np.abs(rendered()[..., :3] - reference(meniscus, scene)).max(axis=2)
     assert errors.mean() < 0.01
+
+
+@pytest.fixture
+def tree(scene):
+    """The compositor's nodes, of which there is only the output."""
+    if bpy.app.version < (5, 0):
+        scene.use_nodes = True
+        scene.node_tree.nodes.clear()
+        scene.node_tree.nodes.new("CompositorNodeComposite")
+        return scene.node_tree
+    tree = bpy.data.node_groups.new("Mine", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    scene.compositing_node_group = tree
+    tree.nodes.new("NodeGroupOutput")
+    return tree
+
+
+def linked(tree):
+    """The names of the nodes that each link joins."""
+    return {(link.from_node.name, link.to_node.name) for link in tree.links}
+
+
+@pytest.mark.parametrize("has_layer_node", [True, False])
+def test_a_picture_that_is_not_made_of_combined_stays_beneath(scene, tree, has_layer_node):
+    (output,) = tree.nodes
+    blur = tree.nodes.new("CompositorNodeBlur")
+    start = tree.nodes.new("CompositorNodeRLayers" if has_layer_node else "CompositorNodeImage")
+    tree.links.new(start.outputs["Alpha"], blur.inputs[0])
+    tree.links.new(blur.outputs[0], output.inputs[0])
+    bpy.ops.meniscus.add_compositing()
+    (over,) = (node for node in tree.nodes if node.type == "ALPHAOVER")
+    (fluid,) = (node for node in tree.nodes if node.type == "R_LAYERS" and node.scene != scene)
+    expected = [(start, blur), (blur, over), (fluid, over), (over, output)]
+    assert linked(tree) == {(first.name, second.name) for first, second in expected}
+    assert len(tree.nodes) == 6
+
+
+def test_the_picture_shows_fluid_where_only_a_viewer_did(scene, tree):
+    (output,) = tree.nodes
+    source, viewer = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeViewer")
+    tree.links.new(source.outputs["Image"], viewer.inputs[0])
+    bpy.ops.meniscus.add_compositing()
+    (over,) = (node for node in tree.nodes if node.type == "ALPHAOVER")
+    assert {(over.name, viewer.name), (over.name, output.name)} <= linked(tree)
+
+
+def test_all_nodes_of_the_view_layer_get_fluid(scene, tree):
+    (output,) = tree.nodes
+    viewer = tree.nodes.new("CompositorNodeViewer")
+    for target in (viewer, output):
+        tree.links.new(tree.nodes.new("CompositorNodeRLayers").outputs["Image"], target.inputs[0])
+    bpy.ops.meniscus.add_compositing()
+    (over,) = (node for node in tree.nodes if node.type == "ALPHAOVER")
+    assert {(over.name, viewer.name), (over.name, output.name)} <= linked(tree)
+
+
+def test_a_muted_link_stays_muted(scene, tree):
+    (output,) = tree.nodes
+    source, invert = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeInvert")
+    tree.links.new(source.outputs["Image"], output.inputs[0])
+    tree.links.new(source.outputs["Image"], invert.inputs["Color"]).is_muted = True
+    bpy.ops.meniscus.add_compositing()
+    (link,) = invert.inputs["Color"].links
+    assert (link.from_node, link.is_muted) == (source, True)
+
+
+def test_nodes_that_are_switched_off_stay_off(scene, tree):
+    (output,) = tree.nodes
+    source, invert = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeInvert")
+    tree.links.new(source.outputs["Image"], invert.inputs["Color"])
+    tree.links.new(invert.outputs[0], output.inputs[0])
+    scene.render.use_compositing = False
+    before = linked(tree)
+    with pytest.raises(RuntimeError, match="switched off"):
+        bpy.ops.meniscus.add_compositing()
+    assert (linked(tree), scene.render.use_compositing, len(bpy.data.scenes)) == (before, False, 1)
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="scenes do not share nodes before 5.0")
+def test_scenes_that_share_the_nodes_stay_as_they_are(scene, tree):
+    tree.links.new(tree.nodes.new("CompositorNodeRLayers").outputs["Image"], tree.nodes["Group Output"].inputs[0])
+    other = scene.copy()
+    before = linked(tree)
+    bpy.ops.meniscus.add_compositing()
+    assert (other.compositing_node_group, linked(tree)) == (tree, before)
+    assert any(node.type == "ALPHAOVER" for node in scene.compositing_node_group.nodes)
+
+
+def test_only_the_view_layer_that_is_used_is_rendered_with_fluid(scene):
+    scene.view_layers.new("Extra")
+    bpy.ops.meniscus.add_compositing()
+    assert [layer.use for layer in scene.view_layers] == [True, True]
+    used = [layer.name for layer in bpy.data.scenes["Scene Fluid"].view_layers if layer.use]
+    assert used == [bpy.context.view_layer.name]
+
+
+def add_box_of_points(scene):
+    """Vertices that are fluid, with faces between them."""
+    bpy.ops.mesh.primitive_cube_add(size=1.5, location=(-1, 0, 1.2))
+    item = bpy.context.object
+    item.meniscus.use_fluid, item.meniscus.source = True, "POINTS"
+    item.meniscus.radius_mode, item.meniscus.radius = "FIXED", 0.1
+    item.data.materials.append(emitting((0, 0, 1)))
+
+
+def add_cubes_of_particles(scene):
+    """Particles that are fluid, and drawn as cubes; their emitter is hidden."""
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0, 50, 0))
+    cube = bpy.context.object
+    cube.data.materials.append(emitting((0, 0, 1)))
+    bpy.ops.mesh.primitive_plane_add(size=2, rotation=(np.pi / 2, 0, 0), location=(0, -2, 0))
+    item = bpy.context.object
+    item.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    settings = item.particle_systems[0].settings
+    settings.count, settings.frame_start, settings.frame_end, settings.physics_type = 12, 1, 1, "NO"
+    settings.render_type, settings.instance_object, settings.particle_size = "OBJECT", cube, 0.5
+    item.show_instancer_for_render = False
+    item.meniscus.use_fluid, item.meniscus.source = True, "PARTICLES"
+    item.meniscus.radius_mode, item.meniscus.radius = "FIXED", 0.1
+    scene.frame_set(2)
+
+
+@pytest.mark.parametrize("add", [add_box_of_points, add_cubes_of_particles])
+def test_what_is_fluid_is_not_drawn_twice(scene, rendered, add):
+    add(scene)
+    scene.meniscus.render_samples = scene.cycles.samples = 4
+
+    def blue(picture):
+        return (picture[..., 2] > 0.5).mean()
+
+    assert blue(rendered()) > 0.03
+    bpy.ops.meniscus.add_compositing()
+    # All balls that are blue are small.
+    assert blue(rendered()) < 0.01
+
+
+def test_what_is_drawn_twice_is_said(scene, capfd):
+    add_cubes_of_particles(scene)
+    scene.objects["Plane"].show_instancer_for_render = True
+    bpy.ops.meniscus.add_compositing()
+    assert scene.objects["Plane"].visible_camera
+    assert "still draws 'Plane'" in capfd.readouterr().out
