@@ -6,6 +6,7 @@ use libfuzzer_sys::arbitrary::{self, Arbitrary};
 use libfuzzer_sys::fuzz_target;
 use meniscus_core::job::Job;
 use meniscus_core::rasterizer::{Image, NO_TRIANGLE, Triangles, View, rasterize};
+use meniscus_core::simd::Path;
 
 const SIDE: usize = 12;
 const BACKGROUND: f32 = 1e10;
@@ -16,6 +17,7 @@ struct Input {
     any: Vec<[f32; 3]>,
     corners: Vec<[u8; 3]>,
     is_perspective: bool,
+    path: usize,
 }
 
 fuzz_target!(|input: Input| {
@@ -40,7 +42,9 @@ fuzz_target!(|input: Input| {
     let (mut depth, mut triangle, mut normal) = (vec![0.0; pixels], vec![0; pixels], vec![[0.0; 3]; pixels]);
     let image = Image { depth: &mut depth, triangle: &mut triangle, normal: &mut normal, background: BACKGROUND };
     let triangles = Triangles::new(&vertices, &corners, &normals).expect("the vertices exist");
-    rasterize(&triangles, &view, image, &Job::default()).expect("nobody cancels");
+    let paths = Path::available();
+    let path = paths[input.path % paths.len()];
+    rasterize(path, &triangles, &view, image, &Job::default()).expect("nobody cancels");
     for pixel in 0..pixels {
         if triangle[pixel] == NO_TRIANGLE {
             assert_eq!((depth[pixel], normal[pixel]), (BACKGROUND, [0.0; 3]));

@@ -1,6 +1,7 @@
 //! Triangles as a camera sees them, for Python.
 
 use meniscus_core::rasterizer::{self, Image, Triangles, View};
+use meniscus_core::simd::Path;
 use pyo3::prelude::*;
 
 use crate::arrays::{Pixels, Rows};
@@ -49,5 +50,8 @@ pub fn rasterize(
         background,
     };
     let (vertices, corners, normals) = (vertices.rows(), corners.rows(), normals.rows());
-    run(python, threads, watch, |job| rasterizer::rasterize(&Triangles::new(vertices, corners, normals)?, &view, image, job))
+    let path = Path::chosen().map_err(python_error)?;
+    run(python, threads, watch, |job| {
+        rasterizer::rasterize(path, &Triangles::new(vertices, corners, normals)?, &view, image, job)
+    })
 }

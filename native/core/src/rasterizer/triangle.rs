@@ -1,16 +1,23 @@
 //! One triangle in camera space: x to the right, y up, planar depth.
 
-use super::{Place, View};
+use super::{View, dot};
 
 /// Its corners.
 pub type Corners = [[f64; 3]; 3];
 
-/// Its edge functions: for the ray of a pixel, each corner's share of the point that it meets, but for a common factor.
+/// Pixels by which rounding may place a corner wrongly.
+const PIXEL_MARGIN: f64 = 0.01;
+
+/// Share of the largest coordinate below which a depth is too uncertain to divide by.
+const UNCERTAIN: f64 = 1e-6;
+
+/// Its edge functions: for the ray of a place in the window, each corner's share of the point that it meets, but for a common
+/// factor.
+#[derive(Clone, Copy)]
 pub struct Edges {
-    functions: [[f64; 3]; 3],
-    /// Depth by the sum of the shares (perspective), or the depths of the corners (orthographic).
-    volume: f64,
-    depths: Option<[f64; 3]>,
+    pub functions: [[f64; 3]; 3],
+    /// Of the corners.
+    pub depths: [f64; 3],
 }
 
 impl Edges {
@@ -18,83 +25,130 @@ impl Edges {
     #[inline(always)]
     pub fn new(corners: &Corners, is_perspective: bool) -> Self {
         let flat = |corner: [f64; 3]| if is_perspective { corner } else { [corner[0], corner[1], 1.0] };
-        let [a, b, c] = corners.map(flat);
+        let [a, b, c] = [flat(corners[0]), flat(corners[1]), flat(corners[2])];
         let functions = [cross(b, c), cross(c, a), cross(a, b)];
-        let volume = super::dot(a, functions[0]);
-        Self { functions, volume, depths: if is_perspective { None } else { Some(corners.map(|corner| corner[2])) } }
+        Self { functions, depths: [corners[0][2], corners[1][2], corners[2][2]] }
     }
 
-    /// The planar depth at which the ray of a place in the window meets the triangle, if it does.
+    /// Whether no place of a rectangle of the window is inside.
+    ///
+    /// Rounding keeps the order of numbers, so that no value inside is beyond those at the corners, to the last bit.
     #[inline(always)]
-    pub fn depth(&self, place: [f64; 2]) -> Option<f64> {
-        let values = self.values(place);
-        let is_inside = values.iter().all(|value| *value >= 0.0) || values.iter().all(|value| *value <= 0.0);
-        let sum = values[0] + values[1] + values[2];
-        if !is_inside || sum == 0.0 {
-            return None;
+    pub fn miss(&self, columns: [f64; 2], rows: [f64; 2]) -> bool {
+        let (mut is_never_positive, mut is_never_negative) = (false, false);
+        for function in &self.functions {
+            let (right, up) = (usize::from(function[0] > 0.0), usize::from(function[1] > 0.0));
+            is_never_positive |= value(function, columns[right], rows[up]) < 0.0;
+            is_never_negative |= value(function, columns[1 - right], rows[1 - up]) > 0.0;
         }
-        Some(match self.depths {
-            None => self.volume / sum,
-            Some(depths) => super::dot(depths, values) / sum,
-        })
+        is_never_positive && is_never_negative
     }
 
-    /// The shares of the corners in the point that the ray of a place in the window meets.
-    pub fn shares(&self, place: [f64; 2]) -> [f64; 3] {
-        let values = self.values(place);
-        let sum = values[0] + values[1] + values[2];
-        values.map(|value| value / sum)
-    }
-
+    /// The values at a place in the window; those of a place inside are all of one sign.
     #[inline(always)]
-    fn values(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        self.functions.map(|function| function[0] * x + function[1] * y + function[2])
+    pub fn values(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        [value(&self.functions[0], x, y), value(&self.functions[1], x, y), value(&self.functions[2], x, y)]
     }
 }
 
-/// The normal of a triangle, in camera space and of any length, that faces the ray of a place in the window.
-pub fn facing([a, b, c]: &Corners, place: [f64; 2], view: &View) -> [f64; 3] {
+#[inline(always)]
+fn value(function: &[f64; 3], x: f64, y: f64) -> f64 {
+    function[0] * x + function[1] * y + function[2]
+}
+
+/// The normal of a triangle in world space, of any length; of the side on which its corners run counterclockwise.
+#[inline(always)]
+pub fn plane_normal([a, b, c]: &Corners, view: &View) -> [f64; 3] {
     let side = |end: &[f64; 3]| [end[0] - a[0], end[1] - a[1], end[2] - a[2]];
     let normal = cross(side(b), side(c));
-    let ray = if view.is_perspective { [place[0], place[1], 1.0] } else { [0.0, 0.0, 1.0] };
-    if super::dot(normal, ray) > 0.0 { normal.map(|part| -part) } else { normal }
+    let rows = &view.camera_from_world;
+    [0, 1, 2].map(|axis| dot(normal, [rows[0][axis], rows[1][axis], rows[2][axis]]))
 }
 
-/// The pixels whose rays may meet a triangle between the clip depths.
-pub fn place(corners: &Corners, view: &View) -> Place {
-    let depths = corners.map(|corner| corner[2]);
-    let (near, far) = (least(depths), greatest(depths));
-    let is_finite = corners.iter().flatten().all(|number| number.is_finite());
-    if !is_finite || far < view.clip[0] || near > view.clip[1] {
-        return Place::default();
+/// The pixels that a triangle may cover: columns and rows, first and behind the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    pub columns: [u16; 2],
+    pub rows: [u16; 2],
+}
+
+impl Place {
+    /// The pixels whose rays may meet a triangle between the clip depths, if there are any.
+    #[inline(always)]
+    pub fn of(corners: &Corners, view: &View) -> Option<Self> {
+        let depths = [corners[0][2], corners[1][2], corners[2][2]];
+        let (near, far) = (least(depths), greatest(depths));
+        let reach = reach(corners);
+        let is_between = far >= view.clip[0] && near <= view.clip[1] && (far > 0.0 || !view.is_perspective);
+        if !(is_between && reach.is_finite()) {
+            return None;
+        }
+        let [x, y] = if !view.is_perspective {
+            [0, 1].map(|axis| [corners[0][axis], corners[1][axis], corners[2][axis]]).map(range)
+        } else if near > 0.0 && near >= view.clip[0].max(UNCERTAIN * reach) {
+            [0, 1].map(|axis| [0, 1, 2].map(|corner: usize| corners[corner][axis] / depths[corner])).map(range)
+        } else if view.clip[0] > 0.0 && view.clip[0] >= UNCERTAIN * reach {
+            beyond(corners, view.clip[0])
+        } else {
+            [[view.window[0], view.window[1]], [view.window[2], view.window[3]]]
+        };
+        let size = view.pixel_size();
+        let columns = pixels(x, view.window[0], size[0], view.width)?;
+        Some(Self { columns, rows: pixels(y, view.window[2], size[1], view.height)? })
     }
-    if view.is_perspective && near <= 1e-6 * far.abs() {
-        // It reaches to the eye or behind it, and may be seen anywhere.
-        return if far <= 0.0 { Place::default() } else { whole(view) };
+}
+
+/// Where in a perspective window the part of a triangle lies that is beyond a depth: least and greatest x and y.
+fn beyond(corners: &Corners, start: f64) -> [[f64; 2]; 2] {
+    let mut ranges = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    let mut include = |point: [f64; 2], depth: f64| {
+        for (range, number) in ranges.iter_mut().zip(point) {
+            *range = [range[0].min(number / depth), range[1].max(number / depth)];
+        }
+    };
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        let (from, to) = (corners[from], corners[to]);
+        if from[2] >= start {
+            include([from[0], from[1]], from[2]);
+        }
+        if (from[2] < start) != (to[2] < start) {
+            let share = (start - from[2]) / (to[2] - from[2]);
+            include([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])), start);
+        }
     }
-    let scaled = |axis: usize| corners.map(|corner| if view.is_perspective { corner[axis] / corner[2] } else { corner[axis] });
-    let [width, height] = view.pixel_size();
-    Place {
-        columns: pixels(scaled(0), view.window[0], width, view.width),
-        rows: pixels(scaled(1), view.window[2], height, view.height),
+    ranges
+}
+
+/// Pixels whose centres lie in a range of the window: the first and the one behind the last, if there are any.
+#[inline(always)]
+fn pixels([low, high]: [f64; 2], start: f64, size: f64, count: usize) -> Option<[u16; 2]> {
+    let first = ((low - start) / size - (0.5 + PIXEL_MARGIN)).ceil().max(0.0);
+    let end = ((high - start) / size + (0.5 + PIXEL_MARGIN)).floor().min(count as f64);
+    (first < end).then_some([first as u16, end as u16])
+}
+
+/// The largest size of a coordinate; infinite where one is not finite.
+#[inline(always)]
+fn reach(corners: &Corners) -> f64 {
+    let mut reach = 0.0;
+    for number in corners.as_flattened() {
+        let size = number.abs();
+        reach = if size <= reach { reach } else { size };
     }
+    if reach.is_nan() { f64::INFINITY } else { reach }
 }
 
-fn whole(view: &View) -> Place {
-    Place { columns: [0, view.width as u16], rows: [0, view.height as u16] }
+#[inline(always)]
+fn range(values: [f64; 3]) -> [f64; 2] {
+    [least(values), greatest(values)]
 }
 
-/// Pixels whose centres lie between coordinates, and one more to each side for rounding.
-fn pixels(values: [f64; 3], start: f64, size: f64, count: usize) -> [u16; 2] {
-    let first = ((least(values) - start) / size - 1.5).floor();
-    let end = ((greatest(values) - start) / size + 1.5).ceil();
-    [first, end].map(|bound| bound.clamp(0.0, count as f64) as u16)
-}
-
+#[inline(always)]
 fn least(values: [f64; 3]) -> f64 {
     values[0].min(values[1]).min(values[2])
 }
 
+#[inline(always)]
 fn greatest(values: [f64; 3]) -> f64 {
     values[0].max(values[1]).max(values[2])
 }
