@@ -14,8 +14,8 @@ from ..fluid.meshes import Meshes, MeshObject
 from .read_materials import read_material
 from .visible_sources import ShownTest, settings_of, shown_in_render, shown_in_viewport
 
-_WITH_SURFACE = {"CURVE", "SURFACE", "FONT", "META"}
-"""Types of objects that have a surface but no mesh."""
+_WITH_SURFACE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+"""Types of objects that have a surface, or can have a mesh made of it."""
 
 
 def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None = None) -> Meshes:
@@ -39,7 +39,7 @@ def _shown_instances(
     depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None
 ) -> Iterator[bpy.types.DepsgraphObjectInstance]:
     """What there is to be seen; each is valid only until the next one is taken."""
-    is_shown = shown_in_render(depsgraph) if viewport is None else _shown_solid(depsgraph, viewport)
+    is_shown = _shown_in_render(depsgraph) if viewport is None else _shown_solid(depsgraph, viewport)
     for instance in depsgraph.object_instances:
         item = instance.instance_object if instance.is_instance else instance.object
         owner = instance.parent if instance.is_instance else item
@@ -47,6 +47,21 @@ def _shown_instances(
             view_layer = depsgraph.view_layer
             if item.visible_camera and not owner.original.indirect_only_get(view_layer=view_layer):
                 yield instance
+
+
+def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
+    is_shown = shown_in_render(depsgraph)
+    if depsgraph.mode == "RENDER":
+        return is_shown
+    return lambda item, owner: is_shown(item, owner) and _shows_itself_in_render(item)
+
+
+def _shows_itself_in_render(item: bpy.types.Object) -> bool:
+    """Whether a render shows an object beside its instances, where a dependency graph of the viewport shows it."""
+    if item.show_instancer_for_render or not item.show_instancer_for_viewport:
+        return True
+    may_make_instances = any(modifier.type == "NODES" for modifier in item.modifiers)
+    return item.instance_type == "NONE" and not item.particle_systems and not may_make_instances
 
 
 def _shown_solid(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D) -> ShownTest:
@@ -129,7 +144,8 @@ class _Collected:
         return self.materials.setdefault(read_material(material), len(self.materials))
 
     def _arrays(self, item: bpy.types.Object) -> _MeshArrays | None:
-        if isinstance(item.data, bpy.types.Mesh):
+        # A mesh in edit mode seems empty, a copy does not.
+        if isinstance(item.data, bpy.types.Mesh) and not item.data.is_editmode:
             key = item.data.as_pointer()
             if key not in self.known:
                 self.known[key] = _read_mesh(item.data)
@@ -144,33 +160,53 @@ class _Collected:
 
 
 def _read_mesh(mesh: bpy.types.Mesh) -> _MeshArrays:
+    """The arrays of a mesh, from its attributes where there are some: other properties take a hundred times as long."""
     mesh.calc_loop_triangles()
+    if not len(mesh.loop_triangles):
+        empty = np.empty((0, 3), np.float32)
+        return _MeshArrays(empty, empty.astype(np.int32), empty.reshape(0, 3, 3), np.empty(0, np.int32))
+    corners = _triangle_corners(mesh)
+    vertices = _values(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
+    vertex_of_corner = _values(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
+    normals = _values(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
+    return _MeshArrays(vertices, vertex_of_corner[corners], normals[corners], _triangle_slots(mesh))
+
+
+def _triangle_corners(mesh: bpy.types.Mesh) -> npt.NDArray[np.int32]:
+    """(T, 3): which corners of its faces the triangles of a mesh have."""
     count = len(mesh.loop_triangles)
-    triangles, corners = np.empty(3 * count, np.int32), np.empty(3 * count, np.int32)
-    slots, vertices = np.empty(count, np.int32), np.empty(3 * len(mesh.vertices), np.float32)
-    normals = np.empty(3 * len(mesh.corner_normals), np.float32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    mesh.loop_triangles.foreach_get("loops", corners)
-    mesh.loop_triangles.foreach_get("material_index", slots)
-    mesh.vertices.foreach_get("co", vertices)
-    mesh.corner_normals.foreach_get("vector", normals)
-    return _MeshArrays(
-        vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3)[corners].reshape(-1, 3, 3), slots
-    )
+    if len(mesh.loops) == 3 * count:  # all faces are triangles
+        return np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    return _values(mesh.loop_triangles, "loops", (count, 3), np.int32)
+
+
+def _triangle_slots(mesh: bpy.types.Mesh) -> npt.NDArray[np.int32]:
+    """(T,): the material slots of a mesh's triangles."""
+    count, slots = len(mesh.loop_triangles), mesh.attributes.get("material_index")
+    if slots is None:
+        return np.zeros(count, np.int32)
+    faces = _values(mesh.loop_triangle_polygons, "value", (count,), np.int32)
+    return _values(slots.data, "value", (len(mesh.polygons),), np.int32)[faces]
+
+
+def _values(
+    collection: bpy.types.bpy_prop_collection, name: str, shape: tuple[int, ...], dtype: type
+) -> npt.NDArray[np.float32] | npt.NDArray[np.int32]:
+    values = np.empty(shape, dtype)
+    collection.foreach_get(name, values.reshape(-1))
+    return values
 
 
 def _placed(arrays: _MeshArrays, world_from_object: npt.NDArray[np.float64]) -> _MeshArrays:
     """A mesh in world space."""
-    linear = world_from_object[:3, :3]
+    axes = world_from_object[:3, :3].T
     # Cofactors turn normals as the inverse transposed does, and exist for flat transforms too; mirrored ones turn them around.
-    cofactors = np.stack(
-        [np.cross(linear[:, 1], linear[:, 2]), np.cross(linear[:, 2], linear[:, 0]), np.cross(linear[:, 0], linear[:, 1])],
-        axis=1,
-    )
-    normals = arrays.normals @ cofactors.T.astype(np.float32)
-    lengths = np.linalg.norm(normals, axis=2, keepdims=True)
-    vertices = arrays.vertices @ linear.T.astype(np.float32) + world_from_object[:3, 3].astype(np.float32)
-    return _MeshArrays(vertices, arrays.triangles, normals / np.maximum(lengths, 1e-30), arrays.slots)
+    cofactors = np.cross(axes[[1, 2, 0]], axes[[2, 0, 1]])
+    cofactors /= np.abs(cofactors).max() or 1.0
+    normals = arrays.normals.reshape(-1, 3) @ cofactors.astype(np.float32)
+    normals /= np.maximum(np.sqrt(np.einsum("ij,ij->i", normals, normals)), np.float32(1e-30))[:, None]
+    vertices = arrays.vertices @ axes.astype(np.float32) + world_from_object[:3, 3].astype(np.float32)
+    return _MeshArrays(vertices, arrays.triangles, normals.reshape(-1, 3, 3), arrays.slots)
 
 
 def _joined(parts: list[npt.NDArray], empty_shape: tuple[int, ...], dtype: type) -> npt.NDArray:

@@ -160,7 +160,7 @@ fn a_triangle_without_area_is_nowhere_else() {
 #[test]
 fn random_triangles_are_those_of_a_ray_caster() {
     let mut random = Random(1);
-    for (is_perspective, clip_start) in [(false, 0.1), (true, 0.1), (true, 0.0)] {
+    for (is_perspective, clip_start) in [(false, 0.1), (true, 0.0), (true, 0.1), (true, 1.0)] {
         for size in [0.05, 2.0] {
             let count = if size < 1.0 { 6000 } else { 60 };
             let middles: Vec<_> = (0..count).map(|_| random.vector()).collect();

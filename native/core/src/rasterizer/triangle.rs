@@ -8,9 +8,6 @@ pub type Corners = [[f64; 3]; 3];
 /// Pixels by which rounding may place a corner wrongly.
 const PIXEL_MARGIN: f64 = 0.01;
 
-/// Share of the largest coordinate below which a depth is too uncertain to divide by.
-const UNCERTAIN: f64 = 1e-6;
-
 /// Its edge functions: for the ray of a place in the window, each corner's share of the point that it meets, but for a common
 /// factor.
 #[derive(Clone, Copy)]
@@ -78,18 +75,18 @@ impl Place {
     pub fn of(corners: &Corners, view: &View) -> Option<Self> {
         let depths = [corners[0][2], corners[1][2], corners[2][2]];
         let (near, far) = (least(depths), greatest(depths));
-        let reach = reach(corners);
         let is_between = far >= view.clip[0] && near <= view.clip[1] && (far > 0.0 || !view.is_perspective);
-        if !(is_between && reach.is_finite()) {
+        if !(is_between && corners.as_flattened().iter().all(|number| number.is_finite())) {
             return None;
         }
         let [x, y] = if !view.is_perspective {
             [0, 1].map(|axis| [corners[0][axis], corners[1][axis], corners[2][axis]]).map(range)
-        } else if near > 0.0 && near >= view.clip[0].max(UNCERTAIN * reach) {
+        } else if near > 0.0 && near >= view.clip[0] {
             [0, 1].map(|axis| [0, 1, 2].map(|corner: usize| corners[corner][axis] / depths[corner])).map(range)
-        } else if view.clip[0] > 0.0 && view.clip[0] >= UNCERTAIN * reach {
+        } else if view.clip[0] > 0.0 {
             beyond(corners, view.clip[0])
         } else {
+            // What reaches to the eye may be seen anywhere.
             [[view.window[0], view.window[1]], [view.window[2], view.window[3]]]
         };
         let size = view.pixel_size();
@@ -125,17 +122,6 @@ fn pixels([low, high]: [f64; 2], start: f64, size: f64, count: usize) -> Option<
     let first = ((low - start) / size - (0.5 + PIXEL_MARGIN)).ceil().max(0.0);
     let end = ((high - start) / size + (0.5 + PIXEL_MARGIN)).floor().min(count as f64);
     (first < end).then_some([first as u16, end as u16])
-}
-
-/// The largest size of a coordinate; infinite where one is not finite.
-#[inline(always)]
-fn reach(corners: &Corners) -> f64 {
-    let mut reach = 0.0;
-    for number in corners.as_flattened() {
-        let size = number.abs();
-        reach = if size <= reach { reach } else { size };
-    }
-    if reach.is_nan() { f64::INFINITY } else { reach }
 }
 
 #[inline(always)]
