@@ -27,6 +27,11 @@ def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D 
         Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
     viewport
         The viewport whose visibility counts; None for that of renders.
+
+    Raises
+    ------
+    InputError
+        A render shows a surface that the viewport's dependency graph does not hold.
     """
     collected = _Collected(depsgraph.view_layer)
     if depsgraph.view_layer.use_solid:
@@ -43,17 +48,30 @@ def _shown_instances(
     for instance in depsgraph.object_instances:
         item = instance.instance_object if instance.is_instance else instance.object
         owner = instance.parent if instance.is_instance else item
-        if instance.show_self and is_shown(item, owner) and not _is_fluid(instance, item, depsgraph):
-            view_layer = depsgraph.view_layer
-            if item.visible_camera and not owner.original.indirect_only_get(view_layer=view_layer):
-                yield instance
+        is_there = instance.show_self and is_shown(item, owner) and not _is_fluid(instance, item, depsgraph)
+        if is_there and _is_for_cameras(item, owner.original, depsgraph.view_layer):
+            yield instance
 
 
 def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
-    is_shown = shown_in_render(depsgraph)
+    is_shown = shown_in_render(depsgraph, lambda item: _is_missed(item, depsgraph.view_layer))
     if depsgraph.mode == "RENDER":
         return is_shown
     return lambda item, owner: is_shown(item, owner) and _shows_itself_in_render(item)
+
+
+def _is_for_cameras(item: bpy.types.Object, owner: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
+    """Whether rays from the camera see an object that `owner`, an original one, puts where it is."""
+    return bool(item.visible_camera) and not owner.indirect_only_get(view_layer=view_layer)
+
+
+def _is_missed(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
+    """Whether something to be seen is lost with an original object that the viewport's dependency graph does not list."""
+    if not _is_for_cameras(item, item, view_layer):
+        return False
+    if item.visible_get(view_layer=view_layer):  # instances may be listed without what makes them
+        return item.type in _WITH_SURFACE and item.show_instancer_for_render
+    return item.type in _WITH_SURFACE or item.instance_type != "NONE"
 
 
 def _shows_itself_in_render(item: bpy.types.Object) -> bool:

@@ -93,7 +93,9 @@ def visible_sources(
         raise NoSourceError(
             "No object supplies balls: enable Meniscus in the object properties of one with particles or points"
         )
-    is_shown = shown_in_viewport(depsgraph, space) if viewport else shown_in_render(depsgraph)
+    is_shown = (
+        shown_in_viewport(depsgraph, space) if viewport else shown_in_render(depsgraph, lambda item: item.meniscus.use_fluid)
+    )
     for source, owner in _places(depsgraph, fluid):
         if is_shown(source.object, owner):
             yield source
@@ -105,12 +107,25 @@ def shown_in_viewport(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView
     return lambda item, owner: owner.original.visible_get(view_layer=depsgraph.view_layer, viewport=space)
 
 
-def shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
-    """Whether a render shows an object; InputError where the viewport's dependency graph lacks a fluid that it does."""
+def shown_in_render(depsgraph: bpy.types.Depsgraph, is_missed: Callable[[bpy.types.Object], bool]) -> ShownTest:
+    """Whether a render shows an object.
+
+    Parameters
+    ----------
+    depsgraph
+        Evaluated dependency graph.
+    is_missed
+        Whether an original object is missed that a render shows and the viewport's dependency graph does not list.
+
+    Raises
+    ------
+    InputError
+        An object is missed.
+    """
     if depsgraph.mode == "RENDER":
         return lambda item, owner: True
     renderable = _renderable_objects(depsgraph.view_layer)
-    _check_evaluated(depsgraph, renderable)
+    _check_evaluated(depsgraph, renderable, is_missed)
     return lambda item, owner: not item.hide_render and owner.original.as_pointer() in renderable
 
 
@@ -164,10 +179,12 @@ def _renderable_objects(view_layer: bpy.types.ViewLayer) -> set[int]:
     return found
 
 
-def _check_evaluated(depsgraph: bpy.types.Depsgraph, renderable: set[int]) -> None:
+def _check_evaluated(
+    depsgraph: bpy.types.Depsgraph, renderable: set[int], is_missed: Callable[[bpy.types.Object], bool]
+) -> None:
     missing = renderable - {item.original.as_pointer() for item in depsgraph.objects}
     for item in depsgraph.view_layer.objects:
-        if item.meniscus.use_fluid and item.as_pointer() in missing:
+        if item.as_pointer() in missing and is_missed(item):
             raise InputError(
                 f"'{item.name}' is hidden in the viewport only, where Blender evaluates this render: "
                 "show it there, or disable it in renders too"

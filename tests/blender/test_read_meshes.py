@@ -5,7 +5,7 @@ import importlib
 import bpy
 import numpy as np
 import pytest
-from fluid_scenes import add_emitter, add_geometry_nodes, add_object, add_points, instance_collection
+from fluid_scenes import add_emitter, add_geometry_nodes, add_object, add_points, input_error, instance_collection
 from mathutils import Matrix
 
 CORNERS = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 2, 0.5), (0, 1, 0), (0, 0, 3), (2, 0, 3)]
@@ -135,6 +135,32 @@ def test_what_a_render_does_not_show_is_not_read(meniscus, collection, empty_sce
     assert seen(meniscus) == {"Faces": 6, "Other": 6}
     hide(item)
     assert seen(meniscus) == {"Other": 6}
+
+
+def instance_on_vertices_with_itself_in_renders(item):
+    item.instance_type, item.show_instancer_for_viewport = "VERTS", False
+
+
+@pytest.mark.parametrize("hide", [lambda item: item.hide_set(True), instance_on_vertices_with_itself_in_renders])
+def test_what_the_viewport_alone_hides_is_an_error(meniscus, collection, hide):
+    """Fluid would not be hidden where it must be. What a render does not show either does not matter."""
+    item = add_faces(collection)
+    hide(item)
+    with pytest.raises(input_error(meniscus), match="'Faces' is hidden in the viewport only"):
+        read(meniscus)
+    item.hide_render = True
+    assert seen(meniscus) == {}
+
+
+def test_instances_that_the_viewport_alone_hides_are_an_error(meniscus, collection, empty_scene):
+    group = bpy.data.collections.new("Group")
+    add_faces(group)
+    instancer = instance_collection(empty_scene, group)
+    instancer.show_instancer_for_viewport = False
+    assert seen(meniscus) == {"Faces": 6}
+    instancer.hide_set(True)
+    with pytest.raises(input_error(meniscus), match="'Instance' is hidden in the viewport only"):
+        read(meniscus)
 
 
 @pytest.mark.parametrize("how", ["object", "collection", "instance"])
