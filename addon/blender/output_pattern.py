@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..fluid.errors import InputError
-from ..output.file_names import expanded, numbered_pattern
+from ..output.file_names import Value, expanded, numbered_pattern
 from .render_scene import RenderSettings
 
 
@@ -28,32 +28,38 @@ def output_pattern(
     Raises
     ------
     InputError
-        The path is a folder, is relative to a file that is not saved, or has an unknown token.
+        The path is a folder, is relative to a file that is not saved, or has tokens that make no sense.
     """
-    if pattern.startswith("//") and not bpy.data.filepath:
+    if not bpy.data.filepath and (pattern.startswith("//") or "{blend_dir" in pattern):
         raise InputError(f"'{pattern}' is relative to the .blend file, but none is open; give an absolute path")
-    if pattern.endswith(("/", "\\")) or Path(bpy.path.abspath(pattern)).is_dir():
+    absolute = Path(bpy.path.abspath(pattern)).absolute()
+    if pattern.endswith(("/", "\\")) or absolute.is_dir():
         raise InputError(f"'{pattern}' is a folder; add a file name such as fluid_####.exr")
-    # Blender since 5.0 has tokens of its own in paths, and braces that stand for themselves.
-    absolute = str(Path(bpy.path.abspath(pattern)).absolute())
-    named = expanded(absolute, _tokens(scene, view_layer, settings))
+    # Braces in the names of folders that are there are no tokens.
+    folder = next(parent for parent in absolute.parents if parent.is_dir())
+    named = str(folder / expanded(str(absolute.relative_to(folder)), _tokens(scene, view_layer, settings)))
     if not named.lower().endswith(".exr"):
         named += ".exr"
     return named if frame_count == 1 else numbered_pattern(named)
 
 
-def _tokens(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, settings: RenderSettings) -> dict[str, str]:
+def _tokens(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, settings: RenderSettings) -> dict[str, Value]:
     render, camera = scene.render, settings.camera or scene.camera
     width, height = settings.resolution or (
         render.resolution_x * render.resolution_percentage // 100,
         render.resolution_y * render.resolution_percentage // 100,
     )
+    blend = Path(bpy.data.filepath)
+    library = Path(bpy.path.abspath(scene.library.filepath)) if scene.library else blend
     return {
-        "blend_name": Path(bpy.data.filepath).stem or "untitled",
+        "blend_name": blend.stem or "Unsaved",
+        "blend_dir": blend.parent,
+        "blend_name_lib": library.stem or "Unsaved",
+        "blend_dir_lib": library.parent,
         "scene_name": scene.name,
         "view_layer": view_layer.name,
         "camera_name": camera.name if camera is not None else "",
-        "fps": f"{render.fps / render.fps_base:g}",
-        "resolution_x": str(width),
-        "resolution_y": str(height),
+        "fps": render.fps / render.fps_base,
+        "resolution_x": width,
+        "resolution_y": height,
     }

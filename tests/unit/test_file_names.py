@@ -30,14 +30,36 @@ def test_a_name_without_hashes_gets_some(pattern: str, expected: str) -> None:
     assert numbered_pattern(pattern) == expected
 
 
-def test_tokens_become_their_values():
-    values = {"scene_name": "Sea/Shore", "fps": "24"}
-    assert expanded("/out/{scene_name}/{{v1}}_{fps}_{pass}_####.exr", values) == "/out/Sea_Shore/{v1}_24_{pass}_####.exr"
+VALUES = {"scene_name": "Sea/Shore #2", "blend_dir": Path("/shots/07"), "fps": 24 / 1.001, "resolution_x": 1920, "dots": ".."}
 
 
-def test_an_unknown_token_is_told_with_those_there_are():
-    with pytest.raises(InputError, match=r"Unknown token \{sceen\} .*choose from \{fps\}, \{pass\}"):
-        expanded("/out/{sceen}.exr", {"fps": "24"})
+@pytest.mark.parametrize(
+    ("pattern", "expected"),
+    [
+        ("/out/{scene_name}/{{v1}}_{pass}_####.exr", "/out/Sea_Shore _2/{v1}_{pass}_####.exr"),
+        ("{blend_dir}{dots}/f.exr", "/shots/07/_./f.exr"),
+        ("{resolution_x}_{resolution_x:######}_{resolution_x:.##}", "1920_001920_1920.00"),
+        ("{fps}_{fps:###}_{fps:.###}_{fps:###.##}", f"{24 / 1.001}_024_23.976_023.98"),
+    ],
+)
+def test_tokens_become_their_values(pattern, expected):
+    assert expanded(pattern, VALUES) == expected
+
+
+@pytest.mark.parametrize(
+    ("pattern", "sentence"),
+    [
+        ("/out/{sceen}.exr", r"Unknown token \{sceen\} .*choose from \{scene_name\}, .*\{pass\}"),
+        ("/out/{fps:2f}.exr", r"Unknown format in the token \{fps:2f\}: numbers can have ###, \.## or ###\.##"),
+        ("/out/{fps:}.exr", r"Unknown format in the token \{fps:\}"),
+        ("/out/{scene_name:##}.exr", r"Unknown format in the token \{scene_name:##\}"),
+        ("/out/{fps.exr", r"A '\{' without its partner .*: write '\{\{' for a brace"),
+        ("/out/fps}.exr", r"A '\}' without its partner"),
+    ],
+)
+def test_tokens_that_make_no_sense_are_told(pattern, sentence):
+    with pytest.raises(InputError, match=sentence):
+        expanded(pattern, VALUES)
 
 
 @pytest.mark.parametrize(
@@ -47,8 +69,10 @@ def test_an_unknown_token_is_told_with_those_there_are():
         ("/a/f_####.exr", "Depth", "/a/f_Depth_####.exr"),
         ("/a/f.exr", "Depth", "/a/f_Depth.exr"),
         ("/a/f####.exr", "Depth", "/a/f_Depth####.exr"),
+        ("/a/####.exr", "Depth", "/a/Depth_####.exr"),
         ("/a/f_{pass}_####.exr", None, "/a/f_####.exr"),
         ("/a/f_####.exr", None, "/a/f_####.exr"),
+        ("/a/{pass}.exr", None, "/a/passes.exr"),
     ],
 )
 def test_passes_in_files_of_their_own_have_their_names(pattern, name, expected):
