@@ -34,12 +34,16 @@ def claim(path: Path) -> bool:
     if not is_taken(path):
         path.unlink(missing_ok=True)
     try:
-        with path.open("xb") as file:
-            file.write(_MARK + f"{this_host()} {os.getpid()}".encode())
+        file = path.open("xb")
     except FileExistsError:
         return False
     except OSError:
         return True  # what is wrong with the place is told when the file is written
+    try:
+        with file:
+            file.write(_MARK + f"{this_host()} {os.getpid()}".encode())
+    except OSError:  # half a mark would count as a file
+        path.unlink(missing_ok=True)
     return True
 
 
