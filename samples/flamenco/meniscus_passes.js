@@ -45,9 +45,14 @@ function compileJob(job) {
             argsBefore: [],
             blendfile: settings.blendfile,
             args: renderArguments(settings, chunk),
-        }));
+        }, steps(chunk)));
         job.addTask(task);
     }
+}
+
+// How many frames the Worker will hear of; Managers that count no steps have no such function.
+function steps(chunk) {
+    return typeof frameCount === "function" ? frameCount(chunk) : 0;
 }
 
 // What follows the Blend file on the command line; everything behind --command belongs to Meniscus.
