@@ -153,12 +153,21 @@ def _print_frame(report: FrameReport, place: str, stream: TextIO) -> None:
         print(f"{head}: {report.error}", file=sys.stderr, flush=True)
         return
     if report.was_there:
-        print(f"{head}: left out, because it is there or claimed: {report.paths[0]}", file=stream, flush=True)
-        return
-    balls, spent = report.info.counts.get("balls", 0), sum(report.info.milliseconds.values())
-    print(f"{head}: {balls:,} balls, {spent:,.0f} ms, {report.info.device}, {report.paths[0]}", file=stream, flush=True)
+        print(f"{head}: left out, because it is there or claimed", file=stream)
+    else:
+        balls, spent = report.info.counts.get("balls", 0), sum(report.info.milliseconds.values())
+        print(f"{head}: {balls:,} balls, {spent:,.0f} ms, {report.info.device}", file=stream)
+    print(*_as_blender_says(report), sep="\n", file=stream, flush=True)
     if report.note:
         print(f"{head}: {report.note}", file=sys.stderr, flush=True)
+
+
+def _as_blender_says(report: FrameReport) -> list[str]:
+    """The lines that Blender prints for a frame: farm managers take files and progress from them."""
+    if report.was_there:
+        return [f'skipping existing frame "{report.paths[0]}"']
+    minutes, seconds = divmod(sum(report.info.milliseconds.values()) / 1e3, 60)
+    return [*(f"Saved: '{path}'" for path in report.written), f"Time: {minutes:02.0f}:{seconds:05.2f}"]
 
 
 def _print_summary(job: RenderJob, reports: list[FrameReport], stream: TextIO) -> None:

@@ -24,7 +24,7 @@ from ..fluid.passes import PASSES
 from ..output.claims import claim, give_up, is_taken, remove_leftovers
 from ..output.exr_content import DEEP_COMPRESSIONS, ExrContent, ExrOptions, deep_content, flat_content
 from ..output.exr_process import ExrProcess
-from ..output.file_names import ended, frame_path, pass_pattern
+from ..output.file_names import frame_path, pass_pattern
 from ..output.whole_file import prepare_place
 from ..render.method import timed
 from .preview import write_png
@@ -82,14 +82,17 @@ class RenderJob:
     use_preview: bool = False
 
     def paths(self, frame: int) -> dict[str, Path]:
-        """The files of a frame by what they hold: "flat", the name of a pass, or "deep"."""
+        """The files of a frame by what they hold: "flat", the name of a pass, "deep", or "preview"."""
         if self.layout == "PASSES":
             patterns = {name: pass_pattern(self.output, PASSES[name].blender_name) for name in self.passes}
         else:
             patterns = {"flat": pass_pattern(self.output, None)}
         if self.use_deep:
-            patterns["deep"] = ended(pass_pattern(self.output, None), "deep")
-        return {content: frame_path(pattern, frame) for content, pattern in patterns.items()}
+            patterns["deep"] = pass_pattern(self.output, "deep")
+        paths = {content: frame_path(pattern, frame) for content, pattern in patterns.items()}
+        if self.use_preview:
+            paths["preview"] = next(iter(paths.values())).with_suffix(".png")
+        return paths
 
 
 @dataclass
@@ -105,7 +108,9 @@ class FrameReport:
     note
         One sentence about unusable balls or missing fluid, empty where there is nothing to say.
     error
-        One sentence, empty where the files (and the preview, if asked for) were written.
+        One sentence, empty where the files were written.
+    written
+        Those of the files that were not there already, or were to be overwritten.
     was_there
         Whether the files were there already, or another process has claimed them.
     is_last
@@ -117,13 +122,19 @@ class FrameReport:
     info: RenderInfo = field(default_factory=RenderInfo)
     note: str = ""
     error: str = ""
+    written: list[Path] = field(default_factory=list)
     was_there: bool = False
     is_last: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         named = {"frame": self.frame, "path": str(self.paths[0]), "paths": list(map(str, self.paths)), "error": self.error}
-        state = {"was_there": self.was_there, "note": self.note, "balls": self.info.counts.get("balls", 0)}
+        state = {
+            "written": list(map(str, self.written)),
+            "was_there": self.was_there,
+            "note": self.note,
+            "balls": self.info.counts.get("balls", 0),
+        }
         return {**named, **state, **self.info.as_dict()}
 
 
@@ -196,9 +207,9 @@ class FrameWork:
         control, job = Control(is_cancelled), self.job
         image = self._read.image(control)
         self.report.info, self.report.note = image.info, _note(image)
-        if job.use_preview:
+        if "preview" in self.paths:
             self._picture = image["combined"]
-        contents = [(name, self._flat(image, name)) for name in self.paths if name != "deep"]
+        contents = [(name, self._flat(image, name)) for name in self.paths if name not in ("deep", "preview")]
         if "deep" in self.paths:
             deep = self._read.deep_image(control)
             image.info.milliseconds["spans"] = deep.info.milliseconds["spans"]
@@ -219,7 +230,9 @@ class FrameWork:
                 self.report.info.milliseconds["write"] = sum(times)
             if self._picture is not None:
                 with timed(self.report.info.milliseconds, "preview"):
-                    write_png(self.report.paths[0].with_suffix(".png"), self._picture)
+                    write_png(self.paths["preview"], self._picture)
+            if self._writing or self._picture is not None:
+                self.report.written = list(self.paths.values())
         except OutputError as error:
             self.fail(error)
         return self.report
@@ -278,7 +291,8 @@ def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[F
 
     It is to be taken on Blender's own thread, and further only when the last function that it gave has been called.
     """
-    prepare_place(next(iter(job.paths(job.frames[0]).values())))
+    for path in job.paths(job.frames[0]).values():
+        prepare_place(path)
     underway: deque[FrameWork] = deque()
     with ExrProcess() as writer:
         is_first = True

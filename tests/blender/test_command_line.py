@@ -107,10 +107,10 @@ def test_the_scenes_frame_range_is_rendered_to_files_beside_the_blend_file(
     assert result.status == 0
     assert result.err == ""
     assert names_in(tmp_path / "passes") == {"fluid_0001.exr", "fluid_0002.exr", "fluid_0003.exr"}
-    lines = result.out.splitlines()
-    assert [line.split(":")[0] for line in lines[:3]] == ["Frame 1 (1/3)", "Frame 2 (2/3)", "Frame 3 (3/3)"]
-    assert all("3 balls" in line and " ms, CPU" in line for line in lines[:3])
-    assert lines[3:] == ["Meniscus wrote 3 of 3 frames"]
+    lines = [line for line in result.out.splitlines() if line.startswith("Frame ")]
+    assert [line.split(":")[0] for line in lines] == ["Frame 1 (1/3)", "Frame 2 (2/3)", "Frame 3 (3/3)"]
+    assert all("3 balls" in line and " ms, CPU" in line for line in lines)
+    assert result.out.endswith("Meniscus wrote 3 of 3 frames\n")
     assert channel_names(tmp_path / "passes" / "fluid_0001.exr") == {f"ViewLayer.{name}" for name in DEPTH_AND_NORMAL}
 
 

@@ -65,15 +65,56 @@ def test_a_deep_file_beside_the_flat_one(scene, run, tmp_path):
     assert run("--output", "//f_####.exr", "--frames", "1", "--deep", "--compression", "PIZ")[0] == 0
     assert names(tmp_path) == ["f_0001.exr", "f_deep_0001.exr"]
     assert (tmp_path / "f_deep_0001.exr").read_bytes()[5] & 8, "the bit of deep files"
+    assert run("--output", "//{pass}/f.exr", "--frames", "1", "--deep", "--layout", "passes", "--passes", "depth")[0] == 0
+    assert names(tmp_path, "f.exr") == ["Depth/f.exr", "deep/f.exr"]
 
 
-def test_tokens_have_the_names_of_blenders_paths(scene, run, tmp_path):
-    output = "//{blend_name}_{scene_name}_{camera_name}_{view_layer}_{fps}_{resolution_x}x{resolution_y}_####"
+@pytest.fixture
+def path_of(meniscus):
+    """The path that an output stands for at a frame, where there are several frames."""
+    names = ("blender.output_pattern", "blender.render_scene", "output.file_names")
+    pattern, rendering, files = (importlib.import_module(f"{meniscus.__name__}.addon.{name}") for name in names)
+
+    def path(output, scene, frame):
+        settings = rendering.RenderSettings(passes=("depth",))
+        return str(files.frame_path(pattern.output_pattern(output, scene, scene.view_layers[0], settings, 2), frame))
+
+    return path
+
+
+def test_tokens_name_files(scene, run, tmp_path):
+    output = "//{blend_name}_{scene_name}_{camera_name}_{view_layer}_{fps:##}_{resolution_x}x{resolution_y}_####"
     assert run("--output", output, "--frames", "3", "--resolution", "20x10")[0] == 0
     assert names(tmp_path) == ["scene_Scene_Camera_ViewLayer_24_20x10_0003.exr"]
     status, _, error = run("--output", "//{shot}.exr", "--frames", "3")
     assert status == 1
     assert "Unknown token {shot}" in error
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="Blender's own paths have tokens since 5.0")
+@pytest.mark.parametrize(
+    "output",
+    [
+        "//{blend_name}_{blend_name_lib}_####.exr",
+        "{blend_dir}/{blend_dir_lib}x/####.exr",
+        "//{camera_name}/{scene_name}/f####.exr",
+        "//{fps}_{fps:###}_{fps:.###}_{fps:###.##}_##.exr",
+        "//{resolution_x}x{resolution_y}_{resolution_x:######}_{resolution_y:.##}_##.exr",
+        "//{{a}}_##.exr",
+    ],
+)
+def test_tokens_are_those_of_blenders_own_paths(scene, path_of, tmp_path, output):
+    (tmp_path / "folder {x}").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "folder {x}" / "a {b}.blend"))
+    scene.name, scene.camera.name = 'Sea: "2"', "..."
+    render = scene.render
+    render.fps, render.fps_base = 24, 1.001
+    render.resolution_x, render.resolution_percentage = 101, 50
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "IMAGE"
+    render.image_settings.file_format = "OPEN_EXR"
+    render.filepath = output
+    assert path_of(output, scene, 7) == render.frame_path(frame=7)
 
 
 def test_files_that_are_there_stay(scene, run, tmp_path):
@@ -86,6 +127,36 @@ def test_files_that_are_there_stay(scene, run, tmp_path):
     scene.render.use_overwrite = False
     assert "wrote 0 of 3 frames" in run("--output", "//####.exr")[1]
     assert "wrote 3 of 3 frames" in run("--output", "//####.exr", "--overwrite")[1]
+
+
+def test_a_preview_that_is_missing_is_made_up_for(scene, run, tmp_path):
+    (tmp_path / "0001.exr").write_bytes(b"whole")
+    arguments = ("--output", "//####.exr", "--frames", "1", "--no-overwrite", "--preview")
+    assert "Meniscus wrote 1 of 1 frames" in run(*arguments)[1]
+    assert (tmp_path / "0001.exr").read_bytes() == b"whole"
+    assert (tmp_path / "0001.png").read_bytes().startswith(b"\x89PNG")
+    assert "Meniscus wrote 0 of 1 frames; 1 were there or claimed" in run(*arguments)[1]
+
+
+def test_farm_managers_are_told_what_blender_tells_them(scene, run, tmp_path):
+    (tmp_path / "0001.exr").write_bytes(b"whole")
+    _, out, _ = run("--output", "//####.exr", "--frames", "1:2", "--no-overwrite", "--deep")
+    lines = out.splitlines()
+    assert [line for line in lines if line.startswith("Saved: ")] == [
+        f"Saved: '{tmp_path}/deep_0001.exr'", f"Saved: '{tmp_path}/0002.exr'", f"Saved: '{tmp_path}/deep_0002.exr'",
+    ]  # fmt: skip
+    assert len([line for line in lines if re.fullmatch(r"Time: [0-9]{2}:[0-9]{2}\.[0-9]{2}", line)]) == 2
+    _, out, _ = run("--output", "//####.exr", "--frames", "1", "--no-overwrite")
+    assert f'skipping existing frame "{tmp_path}/0001.exr"' in out.splitlines()
+
+
+def test_each_folder_of_passes_is_tried_before_anything_is_rendered(scene, run, tmp_path):
+    (tmp_path / "Normal").write_text("no folder")
+    status, out, error = run("--output", "//{pass}/f_####.exr", "--passes", "depth,normal", "--layout", "passes")
+    assert status == 1
+    assert error.startswith("meniscus: Cannot make the folder")
+    assert error.count("\n") == 1
+    assert "0 of 3 frames; 3 were not rendered" in out
 
 
 def test_only_what_is_missing_of_a_frame_is_written(scene, run, tmp_path):
@@ -208,6 +279,19 @@ def test_the_operator_says_what_is_wrong(scene, tmp_path):
 def test_one_frame_keeps_its_name(scene, tmp_path):
     assert bpy.ops.meniscus.export_passes(filepath=str(tmp_path / "still.exr"), use_animation=False) == {"FINISHED"}
     assert names(tmp_path) == ["still.exr"]
+
+
+@pytest.mark.skipif(not bpy.app.binary_path, reason="only the real program can be started")
+def test_the_command_that_flamenco_starts(scene, tmp_path):
+    """Its job type (samples/flamenco) chooses the scene behind the file."""
+    bpy.ops.scene.new(type="EMPTY")
+    bpy.ops.wm.save_mainfile()
+    command = [bpy.app.binary_path, "-b", "-y", str(tmp_path / "scene.blend"), "--scene", "Scene", "--command", "meniscus"]
+    command += ["render", "--frames=1,3", "--output", str(tmp_path / "out" / "fluid_######.exr"), "--no-overwrite"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert names(tmp_path / "out") == ["fluid_000001.exr", "fluid_000003.exr"]
+    assert len(re.findall("^Saved: '(.*)'", result.stdout, re.MULTILINE)) == 2
 
 
 @pytest.mark.skipif(not bpy.app.binary_path, reason="only the real program can be started")
