@@ -50,22 +50,10 @@ function compiled(settings) {
 }
 """
 COUNTS_STEPS = "function frameCount(frames) { return exploded(frames).length; }\n"
-SETTING_KEYS = set(
-    [
-        "key",
-        "type",
-        "subtype",
-        "choices",
-        "propargs",
-        "description",
-        "default",
-        "eval",
-        "evalInfo",
-        "visible",
-        "required",
-        "editable",
-    ]
-)
+SETTING_KEYS = {
+    *("key", "type", "subtype", "choices", "propargs", "description"),
+    *("default", "eval", "evalInfo", "visible", "required", "editable"),
+}
 SETTINGS = {
     "frames": "1-20, 25",
     "chunk_size": 10,
