@@ -81,7 +81,7 @@ def compile_job():
 
 
 def blender_arguments(task, blender_args="-b -y"):
-    """What the Worker starts: it puts its own arguments first, split as a shell does, then what is before and behind the file."""
+    """What the Worker starts: its own arguments come first, split as a shell does, then what is before and behind the file."""
     (command,) = task["commands"]
     parameters = command["parameters"]
     assert command["name"] == "blender-render"
