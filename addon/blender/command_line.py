@@ -18,10 +18,8 @@ from ..fluid.errors import InputError, MeniscusError
 from ..output.whole_file import whole_file
 from .command_line_arguments import parse_arguments
 from .output_pattern import output_pattern
-from .preferences import backend_of, threads_of
-from .render_frames import FrameReport, RenderJob, render_frames
+from .render_frames import FrameReport, RenderJob, frames_of, render_frames
 from .render_scene import RenderSettings
-from .view_layer_passes import cryptomatte_levels
 
 _commands: list[Any] = []
 """What Blender gave for the registered command, to unregister it with."""
@@ -83,17 +81,15 @@ def _render(options: argparse.Namespace) -> int:
 def _job(options: argparse.Namespace) -> RenderJob:
     """What to render: the options, and the scene's own settings for what they leave open."""
     scene = bpy.context.scene
-    frames = options.frames or tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-    if not frames:
-        raise InputError(f"The scene's frame range {scene.frame_start} to {scene.frame_end} is empty; use --frames")
+    frames = options.frames or frames_of(scene)
     view_layer = _view_layer(scene, options.view_layer)
-    settings = RenderSettings(
+    settings = RenderSettings.of(
+        scene,
+        view_layer,
         passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
-        cryptomatte_levels=cryptomatte_levels(view_layer),
-        samples=options.samples or scene.meniscus.render_samples,
-        method=options.method or scene.meniscus.method,
-        backend=options.backend or backend_of(scene),
-        threads=threads_of(scene),
+        samples=options.samples,
+        method=options.method,
+        backend=options.backend,
         camera=_camera(scene, options.camera),
         resolution=options.resolution,
     )

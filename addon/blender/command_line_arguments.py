@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from ..fluid.errors import InputError
 from ..fluid.passes import PASSES, checked_passes
-from ..output.exr_content import COMPRESSIONS
+from ..output.exr_content import COMPRESSIONS, LAYOUTS
 
 _EXAMPLE = """
 example:
@@ -88,7 +88,7 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     render.add_argument("--compression", choices=COMPRESSIONS, default="ZIP", help="all lossless; ZIP if left out")
     render.add_argument(
         "--layout",
-        choices=("multilayer", "multipart", "passes"),
+        choices=[name.lower() for name in LAYOUTS],
         default="multilayer",
         help="all passes in one part of a file, each in a part of its own, or in a file of its own; multilayer if left out",
     )

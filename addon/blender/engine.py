@@ -13,7 +13,6 @@ from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
 from .engine_name import ENGINE
-from .preferences import backend_of, threads_of
 from .read_materials import read_lighting
 from .read_meshes import read_meshes
 from .render_scene import Control, RenderSettings, read_view_layer
@@ -66,6 +65,8 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             with view_matrices(context.region_data):
                 self._draw_surroundings(context, depsgraph)
                 draw_in_engine(context)
+        except MeniscusError as error:
+            STATUS.report(str(error), "")
         except Exception as error:  # noqa: BLE001 - whatever it is, the user sees it
             STATUS.report(f"Meniscus failed unexpectedly ({error}): please report it", traceback.format_exc())
 
@@ -98,32 +99,23 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         self.report({"ERROR"}, sentence)
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer
-        passes = wanted_passes(view_layer)
-        settings = RenderSettings(
-            passes=tuple(image_pass.name for image_pass in passes),
-            cryptomatte_levels=cryptomatte_levels(view_layer),
-            samples=scene.meniscus.render_samples,
-            method=scene.meniscus.method,
-            backend=backend_of(scene),
-            threads=threads_of(scene),
-            # Not the scene's own where the compositor of another scene asks.
-            resolution=(self.resolution_x, self.resolution_y),
-        )
+        view_layer = depsgraph.view_layer
+        # The resolution is not the scene's own where the compositor of another scene asks.
+        settings = RenderSettings.of(depsgraph.scene_eval, view_layer, resolution=(self.resolution_x, self.resolution_y))
         self._show_progress(0.0, "Reading the scene")
         read = read_view_layer(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
         image = read.image(Control(self.test_break, self._show_progress))
         if image.info.dropped_text:
             self.report({"WARNING"}, image.info.dropped_text)
-        self._give(depsgraph, image, passes)
+        self._give(view_layer, image)
 
     def _show_progress(self, share: float, text: str) -> None:
         self.update_progress(share)
         self.update_stats("", text)
 
-    def _give(self, depsgraph: bpy.types.Depsgraph, image: ImageBuffers, passes: list[Pass]) -> None:
+    def _give(self, view_layer: bpy.types.ViewLayer, image: ImageBuffers) -> None:
         """Hand an image to Blender, which wants that of the border alone."""
-        region, view_layer = image.camera.active_region, depsgraph.view_layer
+        region, passes = image.camera.active_region, wanted_passes(view_layer)
         for image_pass in passes[1:]:
             channels = image_pass.channels
             self.add_pass(_name_of(image_pass), len(channels), channels, layer=view_layer.name)

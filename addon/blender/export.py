@@ -12,13 +12,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..fluid.errors import CancelledError, InputError, MeniscusError
-from ..output.exr_content import COMPRESSIONS
+from ..output.exr_content import COMPRESSIONS, LAYOUTS
 from .output_pattern import output_pattern
-from .preferences import backend_of, threads_of
-from .render_frames import LAYOUTS, FrameReport, RenderJob, frame_steps
+from .render_frames import FrameReport, RenderJob, frame_steps, frames_of
 from .render_scene import RenderSettings
 from .sources import has_sources
-from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 _TICK = 0.02
 """Seconds between two looks at what the thread does and whether the user gave up."""
@@ -26,10 +24,7 @@ _TICK = 0.02
 Result = set[str]
 
 # Python 3.11 sees no other names in a comprehension within an annotation.
-_LAYOUTS = [
-    (name, label, LAYOUTS[name])
-    for name, label in (("MULTILAYER", "Multilayer"), ("MULTIPART", "Multi-Part"), ("PASSES", "Files"))
-]
+_LAYOUTS = [(name, *texts) for name, texts in LAYOUTS.items()]
 _COMPRESSIONS = [(name, name.title(), text) for name, text in COMPRESSIONS.items()]
 
 
@@ -132,24 +127,15 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
 
     def _job(self, context: bpy.types.Context) -> RenderJob:
         scene, view_layer = context.scene, context.view_layer
-        passes = tuple(image_pass.name for image_pass in wanted_passes(view_layer))
-        settings = RenderSettings(
-            passes=passes,
-            cryptomatte_levels=cryptomatte_levels(view_layer),
-            samples=scene.meniscus.render_samples,
-            method=scene.meniscus.method,
-            backend=backend_of(scene),
-            threads=threads_of(scene),
-        )
-        whole = tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-        frames = whole if self.use_animation else (scene.frame_current,)
+        settings = RenderSettings.of(scene, view_layer)
+        frames = frames_of(scene) if self.use_animation else (scene.frame_current,)
         return RenderJob(
             scene=scene,
             view_layer=view_layer,
             settings=settings,
             frames=frames,
             output=output_pattern(self.filepath, scene, view_layer, settings, len(frames)),
-            passes=passes,
+            passes=settings.passes,
             layout=self.layout,
             use_deep=self.use_deep,
             compression=self.compression,

@@ -148,8 +148,7 @@ class MENISCUS_OT_copy_problem(bpy.types.Operator):
 
 
 class MENISCUS_OT_add_compositing(bpy.types.Operator):
-    """Render the fluid in a scene of its own, and lay it over this one in the compositor; other nodes stay as they are.
-    Objects that are nothing but fluid lose their ray visibility"""
+    """Lay the fluid, rendered in a scene of its own, over this one. Objects that are only fluid lose their ray visibility"""
 
     bl_idname = "meniscus.add_compositing"
     bl_label = "Composite Fluid over Scene"

@@ -8,6 +8,7 @@ import bpy
 
 from ..fluid.errors import InputError
 from ..output.file_names import Value, expanded, numbered_pattern
+from .read_camera import resolution_of
 from .render_scene import RenderSettings
 
 
@@ -45,10 +46,7 @@ def output_pattern(
 
 def _tokens(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, settings: RenderSettings) -> dict[str, Value]:
     render, camera = scene.render, settings.camera or scene.camera
-    width, height = settings.resolution or (
-        render.resolution_x * render.resolution_percentage // 100,
-        render.resolution_y * render.resolution_percentage // 100,
-    )
+    width, height = settings.resolution or resolution_of(render)
     blend = Path(bpy.data.filepath)
     library = Path(bpy.path.abspath(scene.library.filepath)) if scene.library else blend
     return {

@@ -265,15 +265,29 @@ class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
         _draw_look(self.layout, context.scene.meniscus)
 
 
-class MENISCUS_PT_compositing(_PropertiesPanel, bpy.types.Panel):
-    """The fluid over what another engine renders."""
+class _EnginePanel(_PropertiesPanel):
+    """What holds for the render engine."""
 
-    bl_label = "Meniscus Compositing"
-    bl_context = "render"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+
+class _OtherEnginePanel(_PropertiesPanel):
+    """What can be had of the fluid where another engine renders."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.engine != ENGINE and has_sources(context.scene)
+
+
+class MENISCUS_PT_compositing(_OtherEnginePanel, bpy.types.Panel):
+    """The fluid over what another engine renders."""
+
+    bl_label = "Meniscus Compositing"
+    bl_context = "render"
 
     def draw(self, context: bpy.types.Context) -> None:
         fluid = fluid_scene_of(context.scene)
@@ -283,31 +297,21 @@ class MENISCUS_PT_compositing(_PropertiesPanel, bpy.types.Panel):
             _draw_text(self.layout, f"The compositor lays the fluid of '{fluid.name}' over this scene.", "CHECKMARK")
 
 
-class MENISCUS_PT_sampling(_PropertiesPanel, bpy.types.Panel):
+class MENISCUS_PT_sampling(_EnginePanel, bpy.types.Panel):
     """Antialiasing of the render engine."""
 
     bl_label = "Sampling"
     bl_context = "render"
-    bl_options: ClassVar[set[str]] = set()
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine == ENGINE
 
     def draw(self, context: bpy.types.Context) -> None:
         _split(self.layout).prop(context.scene.meniscus, "render_samples", text="Render")
 
 
-class MENISCUS_PT_render_look(_PropertiesPanel, bpy.types.Panel):
+class MENISCUS_PT_render_look(_EnginePanel, bpy.types.Panel):
     """How renders colour the fluid."""
 
     bl_label = "Fluid"
     bl_context = "render"
-    bl_options: ClassVar[set[str]] = set()
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine == ENGINE
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = _split(self.layout)
@@ -315,16 +319,10 @@ class MENISCUS_PT_render_look(_PropertiesPanel, bpy.types.Panel):
         layout.prop(context.scene.meniscus, "render_meshes")
 
 
-class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
-    """What the render engine gives beside Combined."""
+class _PassesPanel(_PropertiesPanel):
+    """The passes of a view layer."""
 
-    bl_label = "Passes"
     bl_context = "view_layer"
-    bl_options: ClassVar[set[str]] = set()
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine == ENGINE
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, view_layer = _split(self.layout), context.view_layer
@@ -342,6 +340,18 @@ class MENISCUS_PT_passes(_PropertiesPanel, bpy.types.Panel):
         levels.active = view_layer.use_pass_cryptomatte_object
         levels.prop(view_layer, "pass_cryptomatte_depth", text="Levels")
         self.layout.operator("meniscus.export_passes", icon="EXPORT")
+
+
+class MENISCUS_PT_passes(_EnginePanel, _PassesPanel, bpy.types.Panel):
+    """What the render engine gives beside Combined."""
+
+    bl_label = "Passes"
+
+
+class MENISCUS_PT_fluid_passes(_OtherEnginePanel, _PassesPanel, bpy.types.Panel):
+    """What the export writes of a scene that another engine renders."""
+
+    bl_label = "Fluid Passes"
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
@@ -464,6 +474,7 @@ _CLASSES = (
     MENISCUS_PT_sampling,
     MENISCUS_PT_render_look,
     MENISCUS_PT_passes,
+    MENISCUS_PT_fluid_passes,
 )
 
 

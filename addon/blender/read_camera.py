@@ -41,7 +41,7 @@ def read_camera(
     """
     render = depsgraph.scene_eval.render
     camera = _evaluated_camera(depsgraph, camera_object)
-    width, height = resolution or _resolution(render)
+    width, height = resolution or resolution_of(render)
     aspect_x, aspect_y = render.pixel_aspect_x, render.pixel_aspect_y
     projection = camera.calc_matrix_camera(depsgraph, x=width, y=height, scale_x=aspect_x, scale_y=aspect_y)
     whole = Camera(
@@ -70,7 +70,7 @@ def _evaluated_camera(depsgraph: bpy.types.Depsgraph, camera_object: bpy.types.O
     return evaluated
 
 
-def _resolution(render: bpy.types.RenderSettings) -> tuple[int, int]:
+def resolution_of(render: bpy.types.RenderSettings) -> tuple[int, int]:
     """Width and height in pixels, rounded down as Blender does."""
     percentage = render.resolution_percentage
     return render.resolution_x * percentage // 100, render.resolution_y * percentage // 100

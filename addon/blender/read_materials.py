@@ -56,7 +56,7 @@ def read_lighting(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D |
     space
         The viewport whose lights count; None for those of a render.
     """
-    return Lighting(tuple(_lights(depsgraph, space)), _world(depsgraph.scene.world))
+    return Lighting(tuple(_lights(depsgraph, space)), _world(depsgraph.scene_eval.world))
 
 
 def _material_of(item: bpy.types.Object) -> bpy.types.Material | None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..fluid.lighting import Material
 from ..fluid.meshes import Meshes, MeshObject
 from .read_materials import read_material
+from .read_particles import has_particle_systems
 from .visible_sources import ShownTest, settings_of, shown_in_render, shown_in_viewport
 
 _WITH_SURFACE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -99,8 +100,7 @@ def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Objec
 def fluid_replaces_surface(item: bpy.types.Object, settings: bpy.types.PropertyGroup) -> bool:
     """Whether the fluid of a source, with the given ``meniscus`` properties, takes the place of its own surface."""
     is_domain = any(modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" for modifier in item.modifiers)
-    has_particles = any(system.settings.type != "HAIR" for system in item.particle_systems)
-    return is_domain or settings.source == "POINTS" or not has_particles
+    return is_domain or settings.source == "POINTS" or not has_particle_systems(item)
 
 
 @dataclass(frozen=True)

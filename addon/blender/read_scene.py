@@ -64,16 +64,19 @@ def read_fluid(
         One lacks what its settings ask for.
     """
     parts: list[BallPart] = []
-    objects: dict[str, FluidSource] = {}
+    indices: dict[str, int] = {}
+    objects: list[FluidSource] = []
     settings = settings_of(depsgraph.scene_eval, depsgraph)
     for source in visible_sources(depsgraph, viewport, space):
-        known = objects.setdefault(source.object.name_full, read_source(source.object, depsgraph.view_layer, settings))
-        index = list(objects).index(source.object.name_full)
+        index = indices.setdefault(source.object.name_full, len(objects))
+        if index == len(objects):
+            objects.append(read_source(source.object, depsgraph.view_layer, settings))
+        own_color = objects[index].material.color if uses_materials else None
         parts += [
-            replace(part, source=index, colors=known.material.color if uses_materials and part.colors is None else part.colors)
+            replace(part, source=index, colors=own_color if part.colors is None else part.colors)
             for part in _parts_of(source, depsgraph, viewport)
         ]
-    return Fluid(_joined([part for part in parts if len(part)], tuple(settings.color)), tuple(objects.values()))
+    return Fluid(_joined([part for part in parts if len(part)], tuple(settings.color)), tuple(objects))
 
 
 def read_field(scene: bpy.types.Scene) -> Field:

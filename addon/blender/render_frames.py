@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
-from ..fluid.errors import CancelledError, FullDiskError, MeniscusError, OutputError
+from ..fluid.errors import CancelledError, FullDiskError, InputError, MeniscusError, OutputError
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.passes import PASSES
 from ..output.claims import claim, give_up, is_taken, remove_leftovers
@@ -29,13 +29,6 @@ from ..output.whole_file import prepare_place
 from ..render.method import timed
 from .preview import write_png
 from .render_scene import Control, RenderSettings, SceneRender, read_view_layer
-
-LAYOUTS = {
-    "MULTILAYER": "One file a frame, all passes in one part: any program reads it",
-    "MULTIPART": "One file a frame, a part for each pass: programs read only what they need; Blender since 4.5",
-    "PASSES": "A file for each pass",
-}
-"""How passes are put into files."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +48,7 @@ class RenderJob:
     passes
         Names of those that are written.
     layout
-        One of :data:`LAYOUTS`.
+        One of :data:`exr_content.LAYOUTS`.
     use_deep
         Whether each frame gets a deep file beside the others.
     compression
@@ -264,6 +257,20 @@ class FrameWork:
             frames_per_second=job.scene.render.fps / job.scene.render.fps_base,
             is_multipart=job.layout == "MULTIPART",
         )
+
+
+def frames_of(scene: bpy.types.Scene) -> tuple[int, ...]:
+    """The frames that a scene renders.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    frames = tuple(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    if not frames:
+        raise InputError(f"The frame range of '{scene.name}', {scene.frame_start} to {scene.frame_end}, is empty: change it")
+    return frames
 
 
 def render_frames(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[FrameReport]:

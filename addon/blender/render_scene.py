@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 
@@ -28,10 +29,12 @@ from ..render.renderer import render
 from ..render.sample_mean import SampleMean
 from ..render.samples import sample_offset
 from ..render.surroundings import Backdrop, Motion
+from .preferences import backend_of, threads_of
 from .read_camera import read_camera
 from .read_materials import read_lighting
 from .read_meshes import read_meshes
 from .read_scene import Fluid, read_field, read_fluid, read_look
+from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 MOST_STEPS = 8
 """Points in time at which the scene is read for motion blur."""
@@ -68,6 +71,19 @@ class RenderSettings:
     threads: int = 0
     camera: bpy.types.Object | None = None
     resolution: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, **choices: Any) -> RenderSettings:
+        """What a scene and a view layer say, but for `choices` that are not None."""
+        own = {
+            "passes": tuple(image_pass.name for image_pass in wanted_passes(view_layer)),
+            "cryptomatte_levels": cryptomatte_levels(view_layer),
+            "samples": scene.meniscus.render_samples,
+            "method": scene.meniscus.method,
+            "backend": backend_of(scene),
+            "threads": threads_of(scene),
+        }
+        return cls(**{**own, **{name: choice for name, choice in choices.items() if choice is not None}})
 
     @property
     def mean_passes(self) -> tuple[str, ...]:

@@ -30,6 +30,13 @@ COMPRESSIONS: dict[str, str] = {
 DEEP_COMPRESSIONS = ("ZIPS", "RLE", "NONE")
 """Those that OpenEXR has for deep images."""
 
+LAYOUTS: dict[str, tuple[str, str]] = {
+    "MULTILAYER": ("Multilayer", "One file a frame, all passes in one part: any program reads it"),
+    "MULTIPART": ("Multi-Part", "One file a frame, a part for each pass: programs read only what they need; Blender since 4.5"),
+    "PASSES": ("Files", "A file for each pass"),
+}
+"""How passes are put into files: names, what to call them, and what they are."""
+
 HALF_MAX = 65504.0
 """The largest number that a half float holds."""
 

@@ -79,7 +79,9 @@ def pass_pattern(pattern: str, name: str | None) -> str:
 def ended(pattern: str, ending: str) -> str:
     """`pattern` with an ending before the frame number, else before the extension."""
     path = Path(pattern)
-    stem, hashes = re.fullmatch(r"(.*?)([._-]?#*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
+    stem = path.stem.rstrip("#")
+    stem = stem[:-1] if stem.endswith((".", "_", "-")) else stem
+    hashes = path.stem[len(stem) :]
     name = f"{stem}_{ending}{hashes}" if stem else f"{ending}_{hashes}"
     return str(path.with_name(name + path.suffix))
 

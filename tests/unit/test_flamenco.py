@@ -62,8 +62,8 @@ SETTINGS = {
     "deep": True,
     "overwrite": False,
     "view_layer": "Spray",
-    "render_output_path": "/farm/shot 7/fluid_######.exr",
-    "blendfile": "/farm/shot.blend",
+    "render_output_path": "/shows/shot 7/fluid_######.exr",
+    "blendfile": "/shows/shot.blend",
     "scene": "Sea",
 }
 
@@ -92,7 +92,7 @@ def blender_arguments(task, blender_args="-b -y"):
 def meniscus_options(task):
     """The options that Meniscus gets from the task."""
     arguments = blender_arguments(task)
-    assert arguments[:7] == ["-b", "-y", "/farm/shot.blend", "--scene", "Sea", "--command", "meniscus"]
+    assert arguments[:7] == ["-b", "-y", "/shows/shot.blend", "--scene", "Sea", "--command", "meniscus"]
     assert all(isinstance(argument, str) for argument in arguments)
     return parse_arguments(arguments[7:])
 
@@ -108,7 +108,7 @@ def test_the_tasks_have_each_frame_once(compile_job):
 
 def test_settings_become_options(compile_job):
     options = meniscus_options(compile_job()[0])
-    assert (options.output, options.layout, options.deep) == ("/farm/shot 7/fluid_######.exr", "multipart", True)
+    assert (options.output, options.layout, options.deep) == ("/shows/shot 7/fluid_######.exr", "multipart", True)
     assert (options.passes, options.view_layer, options.overwrite) == (("depth", "ball_id"), "Spray", False)
 
 
