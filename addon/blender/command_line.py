@@ -94,8 +94,8 @@ def _job(options: argparse.Namespace) -> RenderJob:
         resolution=options.resolution,
     )
     return RenderJob(
-        scene=scene,
-        view_layer=view_layer,
+        scene_uid=scene.session_uid,
+        view_layer_name=view_layer.name,
         settings=settings,
         frames=frames,
         output=output_pattern(options.output, scene, view_layer, settings, len(frames)),

@@ -11,7 +11,7 @@ from typing import ClassVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..fluid.errors import CancelledError, InputError, MeniscusError
+from ..fluid.errors import CancelledError, GoneError, MeniscusError
 from ..output.exr_content import COMPRESSIONS, LAYOUTS
 from .output_pattern import output_pattern
 from .render_frames import FrameReport, RenderJob, frame_steps, frames_of
@@ -130,8 +130,8 @@ class MENISCUS_OT_export_passes(bpy.types.Operator):
         settings = RenderSettings.of(scene, view_layer)
         frames = frames_of(scene) if self.use_animation else (scene.frame_current,)
         return RenderJob(
-            scene=scene,
-            view_layer=view_layer,
+            scene_uid=scene.session_uid,
+            view_layer_name=view_layer.name,
             settings=settings,
             frames=frames,
             output=output_pattern(self.filepath, scene, view_layer, settings, len(frames)),
@@ -153,7 +153,7 @@ class _Run:
         self._thread = ThreadPoolExecutor(1, "meniscus-export")
         self._rendering: Future[None] | None = None
         self._failure: MeniscusError | None = None
-        self._frame = job.scene.frame_current
+        self._frame = job.scene().frame_current
         self.reports: list[FrameReport] = []
 
     def cancel(self) -> None:
@@ -175,9 +175,6 @@ class _Run:
         except MeniscusError as error:
             self._failure = error
             return False
-        except ReferenceError:
-            self._failure = InputError("The scene that was exported is not there any more, after undo too: export it again")
-            return False
         if isinstance(step, FrameReport):
             self.reports.append(step)
         else:
@@ -194,8 +191,8 @@ class _Run:
         """End the thread, and bring the scene back to the frame that it had, where it is still there."""
         self._thread.shutdown()
         self._steps.close()
-        with suppress(ReferenceError):
-            self._job.scene.frame_set(self._frame)
+        with suppress(GoneError):
+            self._job.scene().frame_set(self._frame)
 
     @property
     def progress_text(self) -> str:

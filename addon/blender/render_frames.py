@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 import numpy.typing as npt
 
-from ..fluid.errors import CancelledError, FullDiskError, InputError, MeniscusError, OutputError
+from ..fluid.errors import CancelledError, FullDiskError, GoneError, InputError, MeniscusError, OutputError
 from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.passes import PASSES
 from ..output.claims import claim, give_up, is_taken, remove_leftovers
@@ -37,8 +37,9 @@ class RenderJob:
 
     Attributes
     ----------
-    scene, view_layer
-        What is seen; the view layer's name becomes part of the channel names.
+    scene_uid, view_layer_name
+        What is seen: a scene's `session_uid`, which it keeps when undo puts another copy in its place, and the name of its
+        view layer, which becomes part of the channel names.
     settings
         How each frame is rendered; Combined is among its passes where there are previews.
     frames
@@ -61,8 +62,8 @@ class RenderJob:
         Whether each frame gets a PNG picture beside its file.
     """
 
-    scene: bpy.types.Scene
-    view_layer: bpy.types.ViewLayer
+    scene_uid: int
+    view_layer_name: str
     settings: RenderSettings
     frames: tuple[int, ...]
     output: str
@@ -73,6 +74,19 @@ class RenderJob:
     use_overwrite: bool = True
     use_placeholders: bool = False
     use_preview: bool = False
+
+    def scene(self) -> bpy.types.Scene:
+        """The scene as it is now, which has the view layer.
+
+        Raises
+        ------
+        GoneError
+            The user has removed one of them.
+        """
+        for scene in bpy.data.scenes:
+            if scene.session_uid == self.scene_uid and self.view_layer_name in scene.view_layers:
+                return scene
+        raise GoneError(f"The view layer '{self.view_layer_name}' or its scene was removed: nothing more can be rendered")
 
     def paths(self, frame: int) -> dict[str, Path]:
         """The files of a frame by what they hold: "flat", the name of a pass, "deep", or "preview"."""
@@ -107,7 +121,7 @@ class FrameReport:
     was_there
         Whether the files were there already, or another process has claimed them.
     is_last
-        Whether the error holds for all frames to come: the disk is full.
+        Whether the error holds for all frames to come: the disk is full, or the scene gone.
     """
 
     frame: int
@@ -145,6 +159,7 @@ class FrameWork:
     report: FrameReport
     paths: dict[str, Path]
     _read: SceneRender | None = None
+    _options: ExrOptions = field(default_factory=ExrOptions)
     _picture: npt.NDArray[np.float32] | None = None
     _writing: list[Future[float]] = field(default_factory=list)
     _failure: MeniscusError | None = None
@@ -177,10 +192,18 @@ class FrameWork:
 
     def read(self) -> None:
         """Bring the scene to the frame and read it: on Blender's own thread."""
+        scene = self.job.scene()
+        view_layer = scene.view_layers[self.job.view_layer_name]
+
+        def set_frame(frame: int, subframe: float) -> None:
+            scene.frame_set(frame, subframe=subframe)
+            view_layer.update()
+
         milliseconds: dict[str, float] = {}
         with timed(milliseconds, "scene"):
-            self._set_frame(self.report.frame, 0.0)
-        self._read = read_view_layer(self.job.view_layer.depsgraph, self.job.settings, self._set_frame)
+            set_frame(self.report.frame, 0.0)
+        self._options = self._options_in(scene)
+        self._read = read_view_layer(view_layer.depsgraph, self.job.settings, set_frame)
         self._read.milliseconds.update({**milliseconds, **self._read.milliseconds})
 
     def render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
@@ -206,7 +229,9 @@ class FrameWork:
         if "deep" in self.paths:
             deep = self._read.deep_image(control)
             image.info.milliseconds["spans"] = deep.info.milliseconds["spans"]
-            contents.append(("deep", deep_content(deep, self._options(_deep_compression(job.compression)))))
+            contents.append(
+                ("deep", deep_content(deep, replace(self._options, compression=_deep_compression(job.compression))))
+            )
         self._read = None
         self._writing = [writer.write(self.paths[name], content) for name, content in contents]
 
@@ -233,12 +258,8 @@ class FrameWork:
     def fail(self, error: MeniscusError) -> None:
         """Note what went wrong, and leave the frame to others."""
         self.report.error = str(error)
-        self.report.is_last = isinstance(error, FullDiskError)
+        self.report.is_last = isinstance(error, FullDiskError | GoneError)
         self._give_up()
-
-    def _set_frame(self, frame: int, subframe: float) -> None:
-        self.job.scene.frame_set(frame, subframe=subframe)
-        self.job.view_layer.update()
 
     def _flat(self, image: ImageBuffers, name: str) -> ExrContent:
         job = self.job
@@ -246,16 +267,15 @@ class FrameWork:
         # Mattes belong to the image of colours.
         mattes = image.cryptomatte if name in ("flat", job.passes[0]) else None
         written = replace(image, passes={key: image[key] for key in passes}, cryptomatte=mattes)
-        return flat_content(written, self._options(job.compression))
+        return flat_content(written, self._options)
 
-    def _options(self, compression: str) -> ExrOptions:
-        job = self.job
+    def _options_in(self, scene: bpy.types.Scene) -> ExrOptions:
         return ExrOptions(
-            view_layer=job.view_layer.name,
-            compression=compression,
+            view_layer=self.job.view_layer_name,
+            compression=self.job.compression,
             frame=self.report.frame,
-            frames_per_second=job.scene.render.fps / job.scene.render.fps_base,
-            is_multipart=job.layout == "MULTIPART",
+            frames_per_second=scene.render.fps / scene.render.fps_base,
+            is_multipart=self.job.layout == "MULTIPART",
         )
 
 
@@ -296,7 +316,8 @@ def render_frames(job: RenderJob, is_cancelled: Callable[[], bool]) -> Iterator[
 def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[FrameReport | Callable[[], None], None, None]:
     """As :func:`render_frames`, but gives the rendering of each frame to the caller, who may do it on another thread.
 
-    It is to be taken on Blender's own thread, and further only when the last function that it gave has been called.
+    It is to be taken on Blender's own thread, and further only when the last function that it gave has been called. The user
+    may undo meanwhile.
     """
     for path in job.paths(job.frames[0]).values():
         prepare_place(path)

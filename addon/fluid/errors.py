@@ -9,6 +9,10 @@ class InputError(MeniscusError, ValueError):
     """The scene, the arrays or the options cannot be used as given."""
 
 
+class GoneError(InputError):
+    """What was to be rendered has been removed: there is no going on."""
+
+
 class DeviceError(MeniscusError):
     """The graphics device or its driver cannot do what was asked."""
 

@@ -64,8 +64,8 @@ def _job(scene: bpy.types.Scene, folder: str, frames: int, passes: tuple[str, ..
     resolution, samples = changes.pop("resolution", None), changes.pop("samples", 1)
     settings = RenderSettings(passes=passes, resolution=resolution, samples=samples)
     return RenderJob(
-        scene=scene,
-        view_layer=scene.view_layers[0],
+        scene_uid=scene.session_uid,
+        view_layer_name=scene.view_layers[0].name,
         settings=settings,
         frames=tuple(range(1, frames + 1)),
         output=f"{folder}/f_####.exr",

@@ -308,8 +308,8 @@ def test_a_cancelled_export_keeps_what_is_whole(meniscus, scene, tmp_path):
     package = f"{meniscus.__name__}.addon.blender"
     modules = {name: importlib.import_module(f"{package}.{name}") for name in ("export", "render_frames", "render_scene")}
     job = modules["render_frames"].RenderJob(
-        scene=scene,
-        view_layer=scene.view_layers[0],
+        scene_uid=scene.session_uid,
+        view_layer_name=scene.view_layers[0].name,
         settings=modules["render_scene"].RenderSettings(passes=("depth",)),
         frames=tuple(range(1, 500)),
         output=str(tmp_path / "####.exr"),
