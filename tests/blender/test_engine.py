@@ -133,6 +133,31 @@ def test_animated_settings_count(scene, rendered):
     assert (passes["Combined.B"][inside].min(), passes["Combined.G"][inside].max()) == (1, 0)
 
 
+def test_animated_colors_of_world_and_materials_count(scene, rendered):
+    scene.meniscus.render_style, scene.render.film_transparent, scene.world = "material", False, bpy.data.worlds.new("World")
+    material = bpy.data.materials.new("Glow")
+    if bpy.app.version < (5, 0):
+        scene.world.use_nodes = material.use_nodes = True
+    bpy.data.objects["Points"].data.materials.append(material)
+    background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    surface = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    surface.inputs["Emission Strength"].default_value, surface.inputs["IOR"].default_value = 1.0, 1.0
+    surface.inputs["Base Color"].default_value = (0, 0, 0, 1)
+    for entry, color in ((background.inputs["Color"], (0, 0, 1, 1)), (surface.inputs["Emission Color"], (1, 0, 0, 1))):
+        entry.default_value = color
+        entry.keyframe_insert("default_value", frame=1)
+        entry.default_value = (0, 1, 0, 1)
+        entry.keyframe_insert("default_value", frame=11)
+    scene.frame_set(6)
+    for entry in (background.inputs["Color"], surface.inputs["Emission Color"]):
+        entry.default_value = (0, 0, 0, 1)  # not what the animation says
+    passes = rendered()
+    middle, corner = (SIZE[1] // 2, SIZE[0] // 2), (0, 0)
+    assert passes["Combined.R"][middle] == pytest.approx(passes["Combined.G"][middle], abs=0.1)
+    assert passes["Combined.B"][corner] == pytest.approx(passes["Combined.G"][corner], abs=0.1)
+    assert passes["Combined.R"][middle] > 0.3 < passes["Combined.B"][corner]
+
+
 def test_an_animation_renders_each_frame_anew(scene, tmp_path):
     item = bpy.data.objects["Points"]
     item.location.x = -1
