@@ -66,8 +66,8 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help="where to write; // is the folder of the .blend file and #### the frame number; {blend_name}, {scene_name}, "
-        "{view_layer}, {camera_name}, {fps}, {resolution_x}, {resolution_y} and {pass} are replaced",
+        help="where to write; // is the folder of the .blend file, #### the frame number and {pass} the name of a pass; the "
+        "tokens of Blender's own paths, such as {blend_name}, {scene_name}, {camera_name} and {fps:##}, are replaced",
     )
     render.add_argument("--camera", metavar="NAME", help="a camera object; the scene's camera if left out")
     render.add_argument(
