@@ -69,7 +69,7 @@ class GpuContext:
     def __init__(self, sharing: SharingContext | None = None) -> None:
         self.shares = sharing is not None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-gl")
-        self._programs: dict[ProgramSource, moderngl.Program] = {}
+        self._programs: dict[ProgramSource, moderngl.Program | moderngl.ComputeShader] = {}
         self._kept: dict[Callable[[GpuContext], Any], Any] = {}
         self._deleted_textures: deque[int] = deque()
         # As many as tell what is wrong, where nobody takes them.
@@ -191,9 +191,9 @@ class GpuContext:
         """Whether OpenGL runs on the CPU here."""
         return any(name in self.renderer.lower() for name in _SOFTWARE)
 
-    def require(self, version: int, draw_buffers: int = 0, texture_size: int = 0) -> None:
-        """Raise DeviceError unless the context has at least this OpenGL version (330), and so many render targets at once and
-        texels along a texture's side.
+    def require(self, version: int, draw_buffers: int = 0, texture_size: int = 0, storage_blocks: int = 0) -> None:
+        """Raise DeviceError unless the context has at least this OpenGL version (330), so many render targets at once, texels
+        along a texture's side, and storage blocks of a compute shader.
         """
         if self.version < version:
             raise DeviceError(
@@ -210,24 +210,41 @@ class GpuContext:
                 f"Textures of {texture_size} texels a side are needed but {self.renderer} offers {self.limits.texture_size}; "
                 "choose another method"
             )
+        if self.limits.storage_blocks < storage_blocks:
+            raise DeviceError(
+                f"{storage_blocks} storage blocks are needed but {self.renderer} offers {self.limits.storage_blocks}; "
+                "choose another method"
+            )
 
     def program(self, source: ProgramSource) -> moderngl.Program:
         """The program, compiled once; DeviceError with files and lines where the driver rejects it."""
+        return cast(moderngl.Program, self._compiled(source))
+
+    def compute_shader(self, source: ProgramSource) -> moderngl.ComputeShader:
+        """The program of a compute shader, as :meth:`program`."""
+        return cast(moderngl.ComputeShader, self._compiled(source))
+
+    def _compiled(self, source: ProgramSource) -> moderngl.Program | moderngl.ComputeShader:
         if source not in self._programs:
-            texts = {stage: text.text for stage, text in source.sources().items()}
             try:
-                self._programs[source] = self.gl.program(
-                    vertex_shader=texts["vertex"],
-                    geometry_shader=texts.get("geometry"),
-                    fragment_shader=texts.get("fragment"),
-                    varyings=source.varyings,
-                )
+                self._programs[source] = self._compile(source)
             except moderngl.Error as error:
                 raise DeviceError(
                     f"The graphics driver rejects {', '.join(source.files.values())}; choose another method, or install "
                     f"another driver: {source.explain(str(error))}"
                 ) from error
         return self._programs[source]
+
+    def _compile(self, source: ProgramSource) -> moderngl.Program | moderngl.ComputeShader:
+        texts = {stage: text.text for stage, text in source.sources().items()}
+        if source.compute is not None:
+            return self.gl.compute_shader(texts["compute"])
+        return self.gl.program(
+            vertex_shader=texts["vertex"],
+            geometry_shader=texts.get("geometry"),
+            fragment_shader=texts.get("fragment"),
+            varyings=source.varyings,
+        )
 
     def set_sampler_units(self, program: moderngl.Program, units: Mapping[str, int]) -> None:
         """Say which texture unit each sampler reads; moderngl does not know samplers of buffer textures."""

@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of a context that a method on OpenGL 3.3 may come to; in brackets what 3.3 guarantees.
+    """The limits of a context that a method may come to; in brackets what OpenGL 3.3 guarantees.
 
     Attributes
     ----------
@@ -21,12 +21,18 @@ class Limits:
         Width and height in pixels of what is drawn at once (1024).
     draw_buffers
         Render targets that a fragment shader writes at once (8).
+    storage_blocks
+        Storage blocks of a compute shader; 0 where there are none (8 in OpenGL 4.3).
+    storage_block_bytes
+        Size of a storage block (16 MB in OpenGL 4.3).
     """
 
     texture_size: int
     texture_buffer_size: int
     viewport_size: int
     draw_buffers: int
+    storage_blocks: int
+    storage_block_bytes: int
 
     @classmethod
     def from_info(cls, info: Mapping[str, Any]) -> Limits:
@@ -37,4 +43,8 @@ class Limits:
             viewport_size=min(info["GL_MAX_VIEWPORT_DIMS"]),
             # Every draw buffer needs an attachment.
             draw_buffers=min(info["GL_MAX_DRAW_BUFFERS"], info["GL_MAX_COLOR_ATTACHMENTS"]),
+            storage_blocks=min(
+                info.get("GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS", 0), info.get("GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS", 0)
+            ),
+            storage_block_bytes=info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 0),
         )

@@ -18,8 +18,8 @@ class ProgramSource:
     ----------
     name
         What the method calls it.
-    vertex, geometry, fragment
-        Shader files, as paths below gpu_shaders/; None where the program has no such stage.
+    vertex, geometry, fragment, compute
+        Shader files, as paths below gpu_shaders/; None where the program has no such stage. A compute shader is alone.
     constants
         Names and values of the ``#define`` lines that all stages get, sorted by name.
     varyings
@@ -27,22 +27,24 @@ class ProgramSource:
     """
 
     name: str
-    vertex: str
+    vertex: str | None = None
     fragment: str | None = None
     geometry: str | None = None
+    compute: str | None = None
     constants: tuple[tuple[str, object], ...] = ()
     varyings: tuple[str, ...] = ()
 
     @property
     def files(self) -> dict[str, str]:
-        """Paths by stage ("vertex", "geometry", "fragment"), in the order of the stages; only those that there are."""
-        stages = {"vertex": self.vertex, "geometry": self.geometry, "fragment": self.fragment}
+        """Paths by stage ("vertex", "geometry", "fragment", "compute"), in the order of the stages; only those that there are."""
+        stages = {"vertex": self.vertex, "geometry": self.geometry, "fragment": self.fragment, "compute": self.compute}
         return {stage: path for stage, path in stages.items() if path is not None}
 
     def sources(self) -> dict[str, Source]:
         """What the driver gets, by stage; DeviceError where a file cannot be read."""
         constants = dict(self.constants)
-        return {stage: Source(path, constants) for stage, path in self.files.items()}
+        version = 330 if self.compute is None else 430
+        return {stage: Source(path, constants, version) for stage, path in self.files.items()}
 
     def explain(self, log: str) -> str:
         """What moderngl reports of a driver that rejects the program, on one line and with the names of the files."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable
 
 import moderngl
 import numpy as np
@@ -10,7 +11,17 @@ import numpy.typing as npt
 
 from ..addon.fluid.errors import DeviceError
 from ..addon.fluid.passes import DEPTH_BACKGROUND
+from ..addon.render.method import Attribute
 from .context import GpuContext
+
+_FORMATS: dict[str, tuple[int, str]] = {
+    "depth": (1, "f4"),
+    "normal": (4, "f4"),
+    "color": (4, "f4"),
+    "velocity": (4, "f4"),
+    "ball": (1, "i4"),
+}
+"""Channels and their type."""
 
 _GL_TEXTURE_2D = 0x0DE1
 _GL_DRAW_FRAMEBUFFER = 0x8CA9
@@ -29,23 +40,21 @@ class SurfaceTextures:
     size
         Width and height, pixels.
     textures
-        "depth" has one channel, "normal" and "color" have four, of which the last says nothing: see :class:`method.Surface`.
-        Empty after the release.
+        "depth" has one channel, vectors have four, of which the last says nothing, "ball" has whole numbers: see
+        :class:`method.Surface`. Empty after the release.
     framebuffer
         Draws into them in this order.
     milliseconds, counts
         As in :class:`method.Surface`.
     """
 
-    def __init__(self, context: GpuContext, size: tuple[int, int], with_color: bool) -> None:
+    def __init__(self, context: GpuContext, size: tuple[int, int], attributes: Iterable[Attribute] = ()) -> None:
         gl = context.gl
         self.size = size
+        formats = {name: _FORMATS[name] for name in ("depth", "normal", *attributes)}
         self.textures: dict[str, moderngl.Texture] = {
-            "depth": gl.texture(size, 1, dtype="f4"),
-            "normal": gl.texture(size, 4, dtype="f4"),
+            name: gl.texture(size, components, dtype=dtype) for name, (components, dtype) in formats.items()
         }
-        if with_color:
-            self.textures["color"] = gl.texture(size, 4, dtype="f4")
         self.framebuffer: moderngl.Framebuffer | None = gl.framebuffer(list(self.textures.values()))
         self.milliseconds: dict[str, float] = {}
         self.counts: dict[str, int] = {}
@@ -65,11 +74,11 @@ class SurfaceTextures:
         width, height = self.size
         self.textures["depth"].write(np.full((height, width), DEPTH_BACKGROUND, np.float32))
 
-    def read(self, name: str) -> npt.NDArray[np.float32]:
-        """(height, width) depth, else (height, width, 3)."""
+    def read(self, name: str) -> npt.NDArray:
+        """(height, width) depth or balls, else (height, width, 3)."""
         width, height = self.size
         texture = self.textures[name]
-        pixels = np.frombuffer(texture.read(), np.float32).reshape(height, width, texture.components)
+        pixels = np.frombuffer(texture.read(), texture.dtype).reshape(height, width, texture.components)
         return pixels[..., 0] if texture.components == 1 else pixels[..., :3]
 
     def read_back(self) -> dict[str, npt.NDArray[np.float32]]:

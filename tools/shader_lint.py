@@ -33,8 +33,8 @@ from meniscus.gpu_shaders.viewport.programs import all_programs as viewport_prog
 SHADERS = ROOT / "gpu_shaders"
 VALIDATOR = "glslangValidator"
 # The suffixes by which the compiler knows the stages.
-SUFFIXES = {"vertex": ".vert", "geometry": ".geom", "fragment": ".frag"}
-SHADER_SUFFIXES = (*SUFFIXES.values(), ".comp", ".glsl")
+SUFFIXES = {"vertex": ".vert", "geometry": ".geom", "fragment": ".frag", "compute": ".comp"}
+SHADER_SUFFIXES = (*SUFFIXES.values(), ".glsl")
 
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 INCLUDE = re.compile(r'^\s*#include "([^"]+)"', re.MULTILINE)

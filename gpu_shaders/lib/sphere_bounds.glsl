@@ -1,5 +1,5 @@
 // Where a sphere lies in the image and how far it is from the eye (Kanamori et al. 2008, section 5.1 and appendix B).
-#include "lib/ball.glsl"
+#include "lib/chord.glsl"
 
 const float UNBOUNDED = 1e30;
 // Rounding may not lose a pixel centre.

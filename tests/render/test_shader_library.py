@@ -9,7 +9,7 @@ import pytest
 
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.gpu_shaders.glsl import Source
-from meniscus.gpu_shaders.methods.depth_peeling.programs import kernel_constants
+from meniscus.gpu_shaders.kernel_constants import kernel_constants
 
 
 def run_on_rows(context, library, constants, body, rows):

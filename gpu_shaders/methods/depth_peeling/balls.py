@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ....addon.fluid.camera import Camera
 from ....addon.fluid.field import Field
 from ....addon.fluid.view_balls import ViewBalls
+from ...camera_parts import camera_uniforms
 from .groups import spatial_order
 from .programs import BALL_TEXTURE_WIDTH
 
@@ -81,17 +82,10 @@ def _steepest_slope(camera: Camera) -> tuple[float, float]:
 
 def frame_uniforms(balls: ViewBalls, distances: BallDistances, camera: Camera, field: Field) -> dict[str, object]:
     """What the shaders of lib/ and this method share."""
-    window = camera.window
     return {
-        "window_middle": ((window.left + window.right) / 2, (window.bottom + window.top) / 2),
-        "pixel_size": camera.pixel_size,
-        "image_middle": (camera.width / 2, camera.height / 2),
-        "image_size": (camera.width, camera.height),
-        "is_perspective": camera.is_perspective,
+        **camera_uniforms(camera),
         "isovalue": field.isovalue,
-        "clip_distances": (camera.clip_start, camera.clip_end),
         "depth_scale": distances.depth_scale,
         "farthest_start": distances.farthest_start,
         "walk_window": float(np.median(balls.radii)),
-        "world_from_view": tuple(camera.world_from_view[:3, :3].T.ravel()),
     }

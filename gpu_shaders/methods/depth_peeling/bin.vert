@@ -1,4 +1,5 @@
 // Chooses for each ball the level of cells that it is drawn by: the first of which at most CELLS_ACROSS lie across it.
+#include "lib/ball.glsl"
 #include "lib/sphere_bounds.glsl"
 #include "methods/depth_peeling/state.glsl"
 #include "methods/depth_peeling/cells.glsl"

@@ -1,5 +1,6 @@
 // Adds a ball's pull on the gradient and its share of the colour at the surface, by blending (Kanamori et al. 2008,
 // section 4, step 4).
+#include "lib/ball.glsl"
 #include "lib/kernel.glsl"
 #include "methods/depth_peeling/state.glsl"
 

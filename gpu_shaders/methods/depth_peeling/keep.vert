@@ -1,4 +1,5 @@
 // Whether a pair's cell still asks for its ball.
+#include "lib/ball.glsl"
 #include "lib/sphere_bounds.glsl"
 #include "methods/depth_peeling/state.glsl"
 #include "methods/depth_peeling/cells.glsl"

@@ -1,6 +1,6 @@
 // The front of each kernel sphere: there the density reaches the isovalue by this ball alone (Kanamori et al. 2008, 5.2).
 #include "lib/conservative_depth.glsl"
-#include "lib/ball.glsl"
+#include "lib/chord.glsl"
 #include "methods/depth_peeling/clip.glsl"
 
 flat in vec4 v_sphere;

@@ -12,7 +12,8 @@ from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.errors import InputError
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.fluid.view_balls import ViewBalls, view_balls
-from ....addon.render.method import Request, Surface, timed
+from ....addon.render.method import Attribute, Request, Surface, timed
+from ...camera_parts import image_parts
 from ...context import GpuContext, shared_context
 from ...surface_textures import SurfaceTextures
 from .balls import BallDistances, ball_textures, frame_uniforms, in_spatial_order
@@ -108,7 +109,7 @@ class DepthPeeling:
         for region in self._parts(request.camera):
             rows, columns = slice(region.y_min, region.y_max), slice(region.x_min, region.x_max)
             size = region.x_max - region.x_min, region.y_max - region.y_min
-            textures = SurfaceTextures(self._context, size, seen.with_colors)
+            textures = SurfaceTextures(self._context, size, seen.attributes)
             _add(surface.counts, drawing.draw(region, textures, (0, 0)))
             surface.depth[rows, columns] = textures.read("depth")
             surface.normal[rows, columns] = textures.read("normal")
@@ -118,7 +119,7 @@ class DepthPeeling:
     def _draw_on_device(self, seen: _Seen, request: Request) -> SurfaceTextures:
         """Draw all parts into one; on the context's thread."""
         camera = request.camera
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), seen.with_colors)
+        textures = SurfaceTextures(self._context, (camera.width, camera.height), seen.attributes)
         textures.counts["balls_drawn"] = len(seen.balls)
         if len(seen.balls):
             drawing = self._drawing(seen, request)
@@ -135,7 +136,8 @@ class DepthPeeling:
         return _Drawing(self._context, self._workspace, seen, request, self._options, self._list_length)
 
     def _parts(self, camera: Camera) -> Iterator[Region]:
-        return _parts(camera, min(self._context.limits.texture_size, self._context.limits.viewport_size))
+        longest_side = min(self._context.limits.texture_size, self._context.limits.viewport_size)
+        return image_parts(camera, _PIXELS_A_PART, longest_side)
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,11 @@ class _Seen:
     groups: Groups | None
     with_colors: bool
     milliseconds: dict[str, float]
+
+    @property
+    def attributes(self) -> tuple[Attribute, ...]:
+        """What is found beside depth and normal."""
+        return ("color",) if self.with_colors else ()
 
 
 class _Drawing:
@@ -193,12 +200,3 @@ def _empty(camera: Camera, with_color: bool) -> Surface:
     shape = (camera.height, camera.width)
     color = np.zeros((*shape, 3), np.float32) if with_color else None
     return Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32), color)
-
-
-def _parts(camera: Camera, max_side: int) -> Iterator[Region]:
-    """Parts of the image that fit into textures and into memory, in rows from below."""
-    columns = min(camera.width, max_side)
-    rows = max(1, min(_PIXELS_A_PART // columns, max_side))
-    for bottom in range(0, camera.height, rows):
-        for left in range(0, camera.width, columns):
-            yield Region(left, bottom, min(left + columns, camera.width), min(bottom + rows, camera.height))

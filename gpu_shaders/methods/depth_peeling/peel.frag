@@ -1,7 +1,7 @@
 // The next influence sphere that the pixel's ray enters behind the last one; the depth test keeps the nearest. Spheres are
 // drawn in the order of their ids, so among equal distances the first, which has the least number, stays.
 #include "lib/conservative_depth.glsl"
-#include "lib/ball.glsl"
+#include "lib/chord.glsl"
 #include "methods/depth_peeling/clip.glsl"
 
 uniform usampler2D state_tx;

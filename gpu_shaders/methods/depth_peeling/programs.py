@@ -9,6 +9,7 @@ from itertools import product
 
 from ....addon.fluid.kernels import KERNELS, Kernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
+from ...kernel_constants import kernel_constants
 from ...programs import ProgramSource
 from .options import Options
 
@@ -121,18 +122,6 @@ def all_programs() -> Iterator[ProgramSource]:
     options = [Options(), Options(diagnostics=True), *(Options(**{name: False}) for name in switches)]
     for kernel, option, flag in product(KERNELS.values(), options, (False, True)):
         yield from Variant(kernel, option, with_colors=flag, with_starts=flag).programs().values()
-
-
-def kernel_constants(kernel: Kernel) -> dict[str, object]:
-    """The kernel as lib/kernel.glsl wants it: ``x^power (low + high x)``."""
-    power = {1: 1, 2: 2, 3: 2, 4: 4}[len(kernel.coefficients) - 1]
-    low, high = (*kernel.coefficients, 0.0)[power : power + 2]
-    return {
-        "KERNEL_DEGREE": kernel.ray_degree,
-        "KERNEL_POWER": power,
-        "KERNEL_LOW": f"float({low!r})",
-        "KERNEL_HIGH": f"float({high!r})",
-    }
 
 
 def _program(name: str, vertex: str, fragment: str, **constants: object) -> ProgramSource:

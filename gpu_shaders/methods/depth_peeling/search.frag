@@ -1,6 +1,7 @@
 // Searches the way from the last crossing to the next for the surface, with the balls of the list; then enters the next ball
 // into the list (Kanamori et al. 2008, section 4.2). A ball leaves the list where the ray leaves its influence sphere: that is
 // known once it is in the list, so only entries are peeled.
+#include "lib/ball.glsl"
 #include "lib/kernel.glsl"
 #include "lib/bezier_clipping.glsl"
 #include "methods/depth_peeling/clip.glsl"

@@ -1,5 +1,6 @@
 // Two triangles around each sphere. With FROM_PAIRS for each pair of a ball and a cell: the part of the ball's rectangle in that
 // cell. Else for each ball. Six vertices each: drivers do badly with instances of so few.
+#include "lib/ball.glsl"
 #include "lib/sphere_bounds.glsl"
 #include "lib/triangles.glsl"
 #include "methods/depth_peeling/state.glsl"

@@ -1,0 +1,39 @@
+"""A compute shader and what it needs, ready to run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .context import GpuContext
+from .programs import ProgramSource
+
+MOST_GROUPS = 32768
+"""Groups of threads in a line; more are put into several lines. OpenGL 4.3 guarantees twice as many."""
+
+
+class ComputeStep:
+    """A compute shader of a method, with the uniforms that stay the same for a frame."""
+
+    def __init__(self, context: GpuContext, source: ProgramSource) -> None:
+        self._gl = context.gl
+        self._shader = context.compute_shader(source)
+        self._names = frozenset(self._shader)
+
+    def set_uniforms(self, values: Mapping[str, object]) -> None:
+        """Set those of `values` that the shader uses."""
+        for name in self._names & values.keys():
+            self._shader[name] = values[name]
+
+    def run(self, columns: int, rows: int = 1) -> None:
+        """Run groups of threads; what they write can be read by the next step."""
+        self._shader.run(columns, rows)
+        self._gl.memory_barrier()
+
+    def run_in_lines(self, groups: int) -> None:
+        """Run that many groups, and maybe some more, in lines of at most MOST_GROUPS."""
+        self.run(min(groups, MOST_GROUPS), max(1, -(-groups // MOST_GROUPS)))
+
+    def run_indirect(self, counts: object, offset: int) -> None:
+        """Run as many groups as the three numbers in a buffer say, from `offset` bytes on."""
+        self._shader.run_indirect(counts, offset)
+        self._gl.memory_barrier()

@@ -1,0 +1,38 @@
+// Balls on rays.
+#include "lib/ray.glsl"
+
+struct Ball {
+    vec3 center;
+    float radius;
+};
+
+// A ball on a ray: x(t) = peak - ((t - middle) / R)^2, t the distance along the ray.
+struct Chord {
+    float peak;
+    float middle;
+    float radius;
+};
+
+// From the ray to the centre in the plane of the centre's depth; the only subtraction of large numbers.
+vec2 ball_offset(Ball ball, Ray ray) {
+    return ball.center.xy - ray.origin + ball.center.z * ray.slope;
+}
+
+Chord ball_chord(Ball ball, Ray ray) {
+    vec2 offset = ball_offset(ball, ray);
+    float along = dot(offset, ray.slope);
+    float turn = offset.x * ray.slope.y - offset.y * ray.slope.x;
+    // |offset x direction|^2 / |direction|^2: nothing cancels.
+    float distance_2 = (dot(offset, offset) + turn * turn) / (ray.stretch * ray.stretch);
+    float radius_2 = ball.radius * ball.radius;
+    return Chord((radius_2 - distance_2) / radius_2, along / ray.stretch - ball.center.z * ray.stretch, ball.radius);
+}
+
+float chord_half_length(Chord chord) {
+    return chord.radius * sqrt(max(chord.peak, 0.0));
+}
+
+float chord_x(Chord chord, float t) {
+    float from_middle = (t - chord.middle) / chord.radius;
+    return chord.peak - from_middle * from_middle;
+}

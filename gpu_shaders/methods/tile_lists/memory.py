@@ -1,0 +1,121 @@
+"""What a frame needs in the memory of the graphics processor, kept from frame to frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ...storage import Storage
+from .programs import CELL_SIZE, LARGE_OCCLUDERS, OCCLUSION_LEVELS
+
+TILE_LEVELS = 3
+SEEN_BYTES = 32
+ENTRY_BYTES = 8
+COUNT_BYTES = 32
+FILL_GROUPS_OFFSET = 16
+_LEAST_SEEN = 1 << 14
+_LEAST_ENTRIES = 1 << 16
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The cells and the tiles of an image of a certain size.
+
+    Attributes
+    ----------
+    cells
+        Columns and rows of the finest cells.
+    level_starts
+        Where each level of the pyramid begins, and where the last one ends.
+    tile_starts
+        The same for the levels of tiles.
+    """
+
+    cells: tuple[int, int]
+    level_starts: tuple[int, ...]
+    tile_starts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, width: int, height: int) -> Grid:
+        """That of an image."""
+        cells = -(-width // CELL_SIZE), -(-height // CELL_SIZE)
+        levels = (max(cells) - 1).bit_length() + 1
+        counts = [_cells_of_level(cells, level) for level in range(levels)]
+        tiles = [_cells_of_level(cells, 1 + 3 * level) for level in range(TILE_LEVELS)]
+        return cls(cells, tuple(np.cumsum([0, *counts]).tolist()), tuple(np.cumsum([0, *tiles]).tolist()))
+
+    @property
+    def levels(self) -> int:
+        """Of the pyramid."""
+        return len(self.level_starts) - 1
+
+    @property
+    def tile_count(self) -> int:
+        """On all levels."""
+        return self.tile_starts[-1]
+
+    def block(self) -> npt.NDArray[np.int32]:
+        """The uniform block Grid of occlusion.glsl."""
+        block = np.zeros((1 + OCCLUSION_LEVELS, 4), np.int32)
+        block[0] = *self.cells, self.levels, self.tile_count
+        block[1 : 1 + self.levels, 0] = self.level_starts[:-1]
+        block[1 : 1 + TILE_LEVELS, 1] = self.tile_starts[:-1]
+        return block
+
+
+def _cells_of_level(cells: tuple[int, int], level: int) -> int:
+    return -(-cells[0] // 2**level) * -(-cells[1] // 2**level)
+
+
+class Memory:
+    """Buffers that grow with what they have to hold.
+
+    Attributes
+    ----------
+    storage
+        What makes them.
+    grid
+        The image's that they are for.
+    """
+
+    def __init__(self, storage: Storage, width: int, height: int) -> None:
+        self.storage = storage
+        self.grid = grid = Grid.of(width, height)
+        self._buffers = {
+            3: storage.reserve(4 * grid.level_starts[-1]),
+            5: storage.reserve(4 * grid.cells[0] * grid.cells[1]),
+            6: storage.reserve(4 * (4 + LARGE_OCCLUDERS)),
+            7: storage.reserve(COUNT_BYTES),
+            9: storage.reserve(4 * grid.tile_count),
+            10: storage.reserve(4 * (grid.tile_count + 1)),
+        }
+        self._grid_block = storage.of(grid.block())
+        self.grow(_LEAST_SEEN, _LEAST_ENTRIES)
+
+    def grow(self, seen: int, entries: int) -> None:
+        """Make room for seen balls, and for entries of lists."""
+        self.seen_capacity, self.entry_capacity = seen, entries
+        for binding, size in ((8, SEEN_BYTES * seen), (11, ENTRY_BYTES * entries)):
+            self._buffers.pop(binding, None)
+            self._buffers[binding] = self.storage.reserve(size)
+
+    @property
+    def counts(self) -> moderngl.Buffer:
+        """The counts of the frame, see seen.glsl."""
+        return self._buffers[7]
+
+    def begin(self) -> None:
+        """Forget the frame before, and bind all buffers."""
+        for binding, value in ((3, 0x7F800000), (5, 0), (7, 0), (9, 0)):
+            self.storage.fill(self._buffers[binding], value)
+        self.forget_large()
+        self._grid_block.bind_to_uniform_block(0)
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+
+    def forget_large(self) -> None:
+        """Forget the large occluders."""
+        self._buffers[6].write(bytes(4))

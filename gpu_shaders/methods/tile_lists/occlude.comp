@@ -1,0 +1,43 @@
+// Draws kernel spheres into the cells, a thread for each; those that cover many cells are left to whole groups of threads. The
+// cells are the same in any order: each has the least distance of all spheres.
+#include "methods/tile_lists/kernel_sphere.glsl"
+
+layout(local_size_x = THREADS) in;
+
+// How many there are, then the balls.
+layout(std430, binding = 6) buffer LargeOccluders {
+    uint large_count;
+    uint large_unused[3];
+    uint large_balls[];
+};
+
+uniform uint step_size;  // one of so many balls is drawn
+uniform bool is_sampled; // nothing is known yet
+
+const int FEW_CELLS = 64;
+
+// Whether others hide the sphere in all of its cells, so that drawing changes nothing.
+bool is_hidden(Occluder occluder) {
+    return !is_sampled && !occluder.opens &&
+           occluder.distance - occluder.radius >= occlusion_farthest(occluder.first, occluder.end - 1);
+}
+
+void main() {
+    uint id = thread_number() * step_size;
+    if (id >= ball_count)
+        return;
+    Occluder occluder = occluder_of(id);
+    int cell_count = occluder_cells(occluder);
+    if (cell_count == 0 || is_hidden(occluder))
+        return;
+    if (cell_count > FEW_CELLS) {
+        uint place = atomicAdd(large_count, 1u);
+        if (place < uint(LARGE_OCCLUDERS)) {
+            large_balls[place] = id;
+            return;
+        }
+    }
+    int width = occluder.end.x - occluder.first.x;
+    for (int cell = 0; cell < cell_count; cell++)
+        draw_cell(occluder, occluder.first + ivec2(cell % width, cell / width));
+}
