@@ -14,8 +14,8 @@ from .programs import CELL_SIZE, LARGE_OCCLUDERS, OCCLUSION_LEVELS
 TILE_LEVELS = 3
 SEEN_BYTES = 32
 ENTRY_BYTES = 8
-COUNT_BYTES = 32
-FILL_GROUPS_OFFSET = 16
+COUNT_BYTES = 48
+FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET = 16, 32
 _LEAST_SEEN = 1 << 14
 _LEAST_ENTRIES = 1 << 16
 
@@ -107,6 +107,11 @@ class Memory:
         """The counts of the frame, see seen.glsl."""
         return self._buffers[7]
 
+    @property
+    def large(self) -> moderngl.Buffer:
+        """The large occluders, see large.glsl."""
+        return self._buffers[6]
+
     def begin(self) -> None:
         """Forget the frame before, and bind all buffers."""
         for binding, value in ((3, 0x7F800000), (5, 0), (7, 0), (9, 0)):
@@ -118,4 +123,4 @@ class Memory:
 
     def forget_large(self) -> None:
         """Forget the large occluders."""
-        self._buffers[6].write(bytes(4))
+        self.large.write(np.array([0, 1, 1, 0], np.uint32))

@@ -19,9 +19,9 @@ from ...context import GpuContext, shared_context
 from ...storage import Storage
 from ...surface_textures import SurfaceTextures
 from .balls import BallBuffers, kernel_shares, least_x
-from .memory import FILL_GROUPS_OFFSET, Memory
+from .memory import FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET, Memory
 from .params import METHOD
-from .programs import LARGE_OCCLUDERS, LIST_LENGTH, THREADS, Variant
+from .programs import LIST_LENGTH, SHORT_LIST, SOFTWARE_SHORT_LIST, THREADS, Variant
 
 _STORAGE_BLOCKS = 15
 """Binding points that are used."""
@@ -54,6 +54,7 @@ class TileLists:
         context.require(METHOD.gl_version, storage_blocks=_STORAGE_BLOCKS)
         self._context = context
         self._list_length = list_length
+        self._short_list = SOFTWARE_SHORT_LIST if context.is_software else SHORT_LIST
         self._storage = Storage(context)
         self._steps: dict[Variant, dict[str, ComputeStep]] = {}
         self._balls: BallBuffers | None = None
@@ -124,7 +125,9 @@ class TileLists:
         size = camera.width, camera.height
         if size not in self._memory:
             self._memory = {size: Memory(self._storage, *size)}
-        variant = Variant(request.field.density_kernel, self._balls.weight is None, wanted, self._list_length)
+        variant = Variant(
+            request.field.density_kernel, self._balls.weight is None, wanted, self._list_length, self._short_list
+        )
         if variant not in self._steps:
             self._steps[variant] = {
                 name: ComputeStep(self._context, program) for name, program in variant.programs().items()
@@ -195,7 +198,8 @@ class _Frame:
             steps["scan"].run(1)
             steps["fill"].run_indirect(memory.counts, FILL_GROUPS_OFFSET)
         with times.of("sort"):
-            steps["sort"].run_in_lines(memory.grid.tile_count)
+            steps["sort_short"].run_in_lines(-(-memory.grid.tile_count // 64))
+            steps["sort_long"].run_indirect(memory.counts, LONG_GROUPS_OFFSET)
 
     def _occlude(self, step_size: int) -> None:
         """Draw the kernel spheres of one of so many balls, and make the pyramid of what they hide."""
@@ -203,7 +207,7 @@ class _Frame:
         self._memory.forget_large()
         steps["occlude"].set_uniforms({"step_size": step_size, "is_sampled": step_size > 1})
         steps["occlude"].run_in_lines(self._groups(step_size))
-        steps["occlude_large"].run(LARGE_OCCLUDERS)
+        steps["occlude_large"].run_indirect(self._memory.large, 0)
         for level in range(0, grid.levels, 4):
             steps["pyramid"].set_uniforms({"base_level": level})
             columns, rows = (-(-side // 2**level) for side in grid.cells)

@@ -1,15 +1,9 @@
 // Draws kernel spheres into the cells, a thread for each; those that cover many cells are left to whole groups of threads. The
 // cells are the same in any order: each has the least distance of all spheres.
 #include "methods/tile_lists/kernel_sphere.glsl"
+#include "methods/tile_lists/large.glsl"
 
 layout(local_size_x = THREADS) in;
-
-// How many there are, then the balls.
-layout(std430, binding = 6) buffer LargeOccluders {
-    uint large_count;
-    uint large_unused[3];
-    uint large_balls[];
-};
 
 uniform uint step_size;  // one of so many balls is drawn
 uniform bool is_sampled; // nothing is known yet
@@ -34,6 +28,7 @@ void main() {
         uint place = atomicAdd(large_count, 1u);
         if (place < uint(LARGE_OCCLUDERS)) {
             large_balls[place] = id;
+            atomicMax(large_groups[0], place + 1u);
             return;
         }
     }

@@ -1,17 +1,10 @@
 // Draws the kernel spheres that cover many cells, a group of threads for each.
 #include "methods/tile_lists/kernel_sphere.glsl"
+#include "methods/tile_lists/large.glsl"
 
 layout(local_size_x = THREADS) in;
 
-layout(std430, binding = 6) readonly buffer LargeOccluders {
-    uint large_count;
-    uint large_unused[3];
-    uint large_balls[];
-};
-
 void main() {
-    if (gl_WorkGroupID.x >= large_count)
-        return;
     Occluder occluder = occluder_of(large_balls[gl_WorkGroupID.x]);
     int cell_count = occluder_cells(occluder);
     int width = occluder.end.x - occluder.first.x;

@@ -23,6 +23,10 @@ LARGE_OCCLUDERS = 4096
 """Kernel spheres that groups of threads draw together; any more are drawn by single threads."""
 THREADS = 128
 """Of a group of the steps that have a thread for each ball."""
+SHORT_LIST = 32
+"""Entries of a tile's list that one thread sorts."""
+SOFTWARE_SHORT_LIST = 512
+"""The same in software, where groups of threads gain nothing and waiting for one another costs."""
 LIST_LENGTH = 32
 """Balls that a ray may be in before it walks without a list of them."""
 
@@ -44,12 +48,15 @@ class Variant:
         What is wanted beside depth and normal.
     list_length
         Balls that a ray may be in before it walks without a list of them.
+    short_list
+        Entries of a tile's list that one thread sorts.
     """
 
     kernel: Kernel
     with_weights: bool = False
     attributes: frozenset[Attribute] = frozenset()
     list_length: int = LIST_LENGTH
+    short_list: int = SHORT_LIST
 
     def programs(self) -> dict[str, ProgramSource]:
         """The programs by name."""
@@ -69,7 +76,8 @@ class Variant:
             _program("cull", **spheres),
             _program("scan"),
             _program("fill", **cells),
-            _program("sort"),
+            _program("sort_short", SHORT_LIST=f"{self.short_list}u"),
+            _program("sort_long"),
             _program("cast", **weights, **cells, **self._casting()),
         )
         return {program.name: program for program in programs}

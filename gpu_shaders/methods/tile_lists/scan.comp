@@ -51,5 +51,6 @@ void main() {
         counts.fill_groups[0] = min(group_count, 32768u);
         counts.fill_groups[1] = (group_count + 32767u) / 32768u;
         counts.fill_groups[2] = 1u;
+        counts.long_groups[2] = 1u;
     }
 }

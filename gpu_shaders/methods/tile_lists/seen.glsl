@@ -34,5 +34,7 @@ layout(std430, binding = 7) buffer Counts {
     uint entry_count;   // the same
     uint crowded_count; // rays in more balls at once than they can list
     uint longest_list;
-    uint fill_groups[4];
+    uint fill_groups[3];
+    uint long_count; // lists that groups of threads sort
+    uint long_groups[3];
 } counts;

@@ -1,29 +1,13 @@
-// Sorts the list of each tile by where the balls begin, then by their ids: the order, and so each sum, is the same in every run.
-// A group of threads for each tile: short lists by counting what comes before each entry, others by bitonic sorting (Batcher
+// Sorts the long lists, a group of threads for each: by counting what comes before each entry, or by bitonic sorting (Batcher
 // 1968), in the group's own memory or, where they are too long for it, where they lie.
 #define ENTRIES_ACCESS coherent
-#include "methods/tile_lists/seen.glsl"
-#include "methods/tile_lists/entries.glsl"
+#include "methods/tile_lists/order.glsl"
 
 layout(local_size_x = 128) in;
-
-layout(std430, binding = 8) readonly buffer SeenBalls {
-    Seen seen[];
-};
-layout(std430, binding = 10) readonly buffer TileStarts {
-    uint tile_starts[];
-};
-
-uniform uint list_count;
-uniform uint entry_capacity;
 
 const uint THREADS = 128u;
 const uint SHARED_ENTRIES = 1024u;
 shared uvec2 own_entries[SHARED_ENTRIES];
-
-bool comes_before(uvec2 one, uvec2 other) {
-    return one.x < other.x || (one.x == other.x && seen[one.y].id < seen[other.y].id);
-}
 
 void sort_by_counting(uint start, uint count) {
     uint own = gl_LocalInvocationIndex;
@@ -101,17 +85,14 @@ void sort_in_place(uint start, uint count) {
 }
 
 void main() {
-    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (tile >= list_count)
+    uint number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (number >= counts.long_count)
         return;
-    uint start = min(tile_starts[tile], entry_capacity);
-    uint count = min(tile_starts[tile + 1u], entry_capacity) - start;
-    if (count <= 1u)
-        return;
-    if (count <= THREADS)
-        sort_by_counting(start, count);
-    else if (count <= SHARED_ENTRIES)
-        sort_shared(start, count);
+    uvec2 list = list_of(tile_counts[number]);
+    if (list.y <= THREADS)
+        sort_by_counting(list.x, list.y);
+    else if (list.y <= SHARED_ENTRIES)
+        sort_shared(list.x, list.y);
     else
-        sort_in_place(start, count);
+        sort_in_place(list.x, list.y);
 }

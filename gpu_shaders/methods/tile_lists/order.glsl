@@ -1,0 +1,25 @@
+// The order of the lists: by where the balls begin, then by their ids. So it, and each sum, is the same in every run.
+#include "methods/tile_lists/seen.glsl"
+#include "methods/tile_lists/entries.glsl"
+
+layout(std430, binding = 8) readonly buffer SeenBalls {
+    Seen seen[];
+};
+layout(std430, binding = 9) buffer TileCounts {
+    uint tile_counts[]; // the tiles with long lists
+};
+layout(std430, binding = 10) readonly buffer TileStarts {
+    uint tile_starts[];
+};
+
+uniform uint entry_capacity;
+
+bool comes_before(uvec2 one, uvec2 other) {
+    return one.x < other.x || (one.x == other.x && seen[one.y].id < seen[other.y].id);
+}
+
+// Where a tile's list begins, and its length.
+uvec2 list_of(uint tile) {
+    uint start = min(tile_starts[tile], entry_capacity);
+    return uvec2(start, min(tile_starts[tile + 1u], entry_capacity) - start);
+}
