@@ -153,7 +153,8 @@ pub fn place(
         speed: written(&mut speed)?,
     };
     let motion = Motion { previous: &previous, following: &following, seconds };
-    run(python, threads, watch, |job| placing::place(&view, surface, motion, places, job))
+    let path = Path::chosen().map_err(python_error)?;
+    run(python, threads, watch, |job| placing::place(path, &view, surface, motion, places, job))
 }
 
 /// Gives each pixel the number of its ball.
