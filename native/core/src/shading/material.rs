@@ -107,7 +107,11 @@ struct Parameters<S: Simd> {
 impl<S: Simd> Parameters<S> {
     #[inline(always)]
     fn gathered(simd: S, materials: &[Material], indices: &[usize; LANES]) -> Self {
+        let is_one = indices.iter().all(|index| *index == indices[0]);
         let get = |parameter: fn(&Material) -> f32| {
+            if is_one {
+                return simd.splat(parameter(&materials[indices[0]]));
+            }
             let mut lanes = Lanes::splat(0.0);
             for (lane, index) in lanes.0.iter_mut().zip(indices) {
                 *lane = parameter(&materials[*index]);
@@ -164,8 +168,9 @@ pub fn numbers<S: Simd>(simd: S, numbers: &[f32]) -> S::Vector {
 /// Sixteen vectors, or fewer and zeros.
 #[inline(always)]
 pub fn triples<S: Simd>(simd: S, triples: &[[f32; 3]]) -> Triple<S> {
-    let mut lanes = [Lanes::splat(0.0); 3];
-    for (lane, triple) in triples.iter().enumerate() {
+    let (mut padded, mut lanes) = ([[0.0; 3]; LANES], [Lanes::splat(0.0); 3]);
+    padded[..triples.len()].copy_from_slice(triples);
+    for (lane, triple) in padded.iter().enumerate() {
         for axis in 0..3 {
             lanes[axis].0[lane] = triple[axis];
         }
