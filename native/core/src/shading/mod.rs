@@ -212,14 +212,16 @@ impl RowTask<'_> {
     #[inline(always)]
     fn normals<S: Simd>(&self, simd: S, start: usize, count: usize, to_eye: Triple<S>) -> Triple<S> {
         let world = material::triples(simd, &self.normal[start..start + count]);
-        let [right, up, forward] = self.view.camera_from_world.map(|row| {
-            let axis = row.map(|number| simd.splat(number as f32));
-            Triple(axis).dot(world)
-        });
+        let [right, up, forward] = self.view.camera_from_world.map(|row| row.map(|number| number as f32));
+        let [right, up, forward] =
+            [Triple::splat(simd, right).dot(world), Triple::splat(simd, up).dot(world), Triple::splat(simd, forward).dot(world)];
         let zero = simd.splat(0.0);
-        let normal = Triple([right, up, zero - forward]);
+        let mut normal = Triple([right, up, zero - forward]);
         let away = normal.dot(to_eye).lt(zero);
-        Triple(normal.0.map(|axis| (zero - axis).select(away, axis)))
+        for axis in &mut normal.0 {
+            *axis = (zero - *axis).select(away, *axis);
+        }
+        normal
     }
 
     /// An image has one alpha for all channels, so that what is unknown is dimmed as a whole and its tint is a grey's.
@@ -266,7 +268,8 @@ impl RowTask<'_> {
                 channel.0[lane] = *number;
             }
         }
-        channels.map(|channel| simd.load(&channel))
+        let [r, g, b, a] = &channels;
+        [simd.load(r), simd.load(g), simd.load(b), simd.load(a)]
     }
 }
 
@@ -290,11 +293,13 @@ impl Task for PointsTask<'_> {
             for (lane, index) in material.iter_mut().zip(&self.points.material[part.clone()]) {
                 *lane = usize::try_from(*index).unwrap_or(0);
             }
-            let [position, normal, to_eye, base] =
-                [self.points.position, self.points.normal, self.points.to_eye, self.points.color]
-                    .map(|all| material::triples(simd, &all[part.clone()]));
+            let position = material::triples(simd, &self.points.position[part.clone()]);
+            let normal = material::triples(simd, &self.points.normal[part.clone()]);
+            let to_eye = material::triples(simd, &self.points.to_eye[part.clone()]);
+            let base = material::triples(simd, &self.points.color[part]);
             let shaded = material::shade(simd, self.scene, &material, position, normal, to_eye, base);
-            let channels = shaded.radiance.0.map(Vector::lanes);
+            let [r, g, b] = shaded.radiance.0;
+            let channels = [r.lanes(), g.lanes(), b.lanes()];
             for (lane, point) in radiance.iter_mut().enumerate() {
                 *point = [0, 1, 2].map(|axis| channels[axis].0[lane]);
             }
