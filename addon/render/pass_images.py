@@ -19,7 +19,7 @@ from .material_shading import shade_image
 from .method import Attribute, Request, Surface
 from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
 from .spans import find_spans
-from .surroundings import Backdrop, Motion
+from .surroundings import Backdrop, Color, Motion
 from .thickness import at_pixels, thickness_image
 
 FloatArray = npt.NDArray[np.float32]
@@ -240,21 +240,23 @@ class PassImages:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
         shown, uses_scene = self._fluid, LOOK_STYLES[self._look.style].uses_scene
         rgba = self._memory.empty((*shown.shape, 4), np.float32)
-        if self._behind is not None:
-            rgba[:] = self._behind.rgba
-        elif not uses_scene:
-            rgba.fill(0)
+        if self._behind is None:
+            behind: Color | None = (0.0, 0.0, 0.0, 0.0)
+        else:
+            behind = self._behind.color_behind if self._is_alone else None
+        if behind is None or not uses_scene:
+            rgba[:] = behind if self._behind is None else self._behind.rgba
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
         if uses_scene:
-            self._shade_materials(rgba)
+            self._shade_materials(rgba, behind)
         elif shown.any():
             balls, camera = self._request.balls, self._request.camera
             ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
             rgba[shown] = shaded(self._points(shown), self._look, ranges).over(rgba[shown])
         return rgba
 
-    def _shade_materials(self, rgba: FloatArray) -> None:
+    def _shade_materials(self, rgba: FloatArray, behind: Color | None) -> None:
         """Lay the fluid's materials over `rgba`."""
         request, surface = self._request, self._surface
         shade_image(
@@ -267,7 +269,7 @@ class PassImages:
             tuple(source.material for source in self._sources),
             self._look.lighting,
             self._contrast,
-            is_over_nothing=self._behind is None,
+            behind=behind,
             threads=request.threads,
             watch=request.watch,
         )

@@ -243,7 +243,8 @@ impl<'a> Block<'a> {
 
     #[inline(always)]
     fn put_vectors(&self, motion: &Motion<'_>, target: &mut [[f32; 4]]) {
-        if self.is_empty {
+        let stands_still = self.velocity.is_empty() && *self.view == *motion.previous && *self.view == *motion.following;
+        if self.is_empty || stands_still {
             return target.fill([0.0; 4]);
         }
         let velocity = columns(self.velocity);
@@ -291,13 +292,13 @@ impl Place {
         let mut place = Self { pixel: [[0.0; BLOCK]; 2], depth: [1.0; BLOCK] };
         let [width, height] = view.pixel_size();
         let [right, up, forward] = view.camera_from_world;
-        for pixel in 0..BLOCK {
+        for (pixel, place_depth) in place.depth.iter_mut().enumerate() {
             let offset = [0, 1, 2].map(|axis| points[axis][pixel] - view.eye[axis]);
             let depth = if view.is_perspective { dot(forward, offset) } else { 1.0 };
             let scale = if view.is_perspective { 1.0 / depth } else { 1.0 };
             place.pixel[0][pixel] = (dot(right, offset) * scale - view.window[0]) / width;
             place.pixel[1][pixel] = (dot(up, offset) * scale - view.window[2]) / height;
-            place.depth[pixel] = depth;
+            *place_depth = depth;
         }
         place
     }

@@ -58,8 +58,8 @@ pub struct Image<'a> {
     pub contrast: &'a [f32],
     /// Premultiplied: what is behind, then what is seen.
     pub rgba: &'a mut [[f32; 4]],
-    /// Whether there is nothing behind, whatever `rgba` holds.
-    pub is_over_nothing: bool,
+    /// The one colour of all that is behind, whatever `rgba` holds.
+    pub behind: Option<[f32; 4]>,
 }
 
 /// Points to be shaded: positions, unit normals, and unit directions to the eye, which the normals face.
@@ -90,7 +90,7 @@ pub fn shade_image(path: Path, view: &View, scene: &Scene<'_>, image: Image<'_>,
     }
     check_materials(scene, image.material)?;
     job.expect(view.height);
-    let Image { depth, normal, color, material, contrast, rgba, is_over_nothing } = image;
+    let Image { depth, normal, color, material, contrast, rgba, behind } = image;
     rgba.par_chunks_mut(view.width).enumerate().try_for_each(|(row, rgba)| {
         let line = row * view.width..(row + 1) * view.width;
         path.dispatch(RowTask {
@@ -103,7 +103,7 @@ pub fn shade_image(path: Path, view: &View, scene: &Scene<'_>, image: Image<'_>,
             material: &material[line.clone()],
             contrast: if contrast.is_empty() { contrast } else { &contrast[line] },
             rgba,
-            is_over_nothing,
+            behind,
         });
         job.advance(1)
     })
@@ -146,7 +146,7 @@ struct RowTask<'a> {
     material: &'a [i32],
     contrast: &'a [f32],
     rgba: &'a mut [[f32; 4]],
-    is_over_nothing: bool,
+    behind: Option<[f32; 4]>,
 }
 
 impl Task for RowTask<'_> {
@@ -157,8 +157,10 @@ impl Task for RowTask<'_> {
         for start in (0..self.depth.len()).step_by(LANES) {
             let count = LANES.min(self.depth.len() - start);
             let material = &self.material[start..start + count];
-            if self.is_over_nothing && !material.iter().all(|index| *index >= 0) {
-                self.rgba[start..start + count].fill([0.0; 4]);
+            if let Some(behind) = self.behind
+                && material.iter().any(|index| *index < 0)
+            {
+                self.rgba[start..start + count].fill(behind);
             }
             if material.iter().any(|index| *index >= 0) {
                 self.shade(simd, start, count);
@@ -213,8 +215,11 @@ impl RowTask<'_> {
     fn normals<S: Simd>(&self, simd: S, start: usize, count: usize, to_eye: Triple<S>) -> Triple<S> {
         let world = material::triples(simd, &self.normal[start..start + count]);
         let [right, up, forward] = self.view.camera_from_world.map(|row| row.map(|number| number as f32));
-        let [right, up, forward] =
-            [Triple::splat(simd, right).dot(world), Triple::splat(simd, up).dot(world), Triple::splat(simd, forward).dot(world)];
+        let [right, up, forward] = [
+            Triple::splat(simd, right).dot(world),
+            Triple::splat(simd, up).dot(world),
+            Triple::splat(simd, forward).dot(world),
+        ];
         let zero = simd.splat(0.0);
         let mut normal = Triple([right, up, zero - forward]);
         let away = normal.dot(to_eye).lt(zero);
@@ -259,8 +264,8 @@ impl RowTask<'_> {
     #[inline(always)]
     fn behind<S: Simd>(&self, simd: S, start: usize, count: usize) -> [S::Vector; 4] {
         let (mut pixels, mut channels) = ([[0.0; 4]; LANES], [Lanes::splat(0.0); 4]);
-        if self.is_over_nothing {
-            return [simd.splat(0.0); 4];
+        if let Some([r, g, b, a]) = self.behind {
+            return [simd.splat(r), simd.splat(g), simd.splat(b), simd.splat(a)];
         }
         pixels[..count].copy_from_slice(&self.rgba[start..start + count]);
         for (lane, pixel) in pixels.iter().enumerate() {
