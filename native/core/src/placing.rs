@@ -252,19 +252,9 @@ impl<'a> Block<'a> {
         let before = Place::of(motion.previous, &moved(&self.point, &velocity, -motion.seconds));
         let after = Place::of(motion.following, &moved(&self.point, &velocity, motion.seconds));
         let mut vectors = [[0.0; 4]; BLOCK];
+        let (past, future) = (difference(&self.seen, &before, &now), difference(&self.seen, &now, &after));
         for (pixel, vector) in vectors.iter_mut().enumerate() {
-            let is_seen = self.seen[pixel] > 0.0;
-            let difference = |a: &Place, b: &Place, axis: usize| {
-                // What passes the eye has no place in the other frame's image.
-                let is_there = is_seen & (a.depth[pixel] > 0.0) & (b.depth[pixel] > 0.0);
-                if is_there { (a.pixel[axis][pixel] - b.pixel[axis][pixel]) as f32 } else { 0.0 }
-            };
-            *vector = [
-                difference(&before, &now, 0),
-                difference(&before, &now, 1),
-                difference(&now, &after, 0),
-                difference(&now, &after, 1),
-            ];
+            *vector = [past[0][pixel], past[1][pixel], future[0][pixel], future[1][pixel]];
         }
         target.copy_from_slice(&vectors[..target.len()]);
     }
@@ -304,12 +294,28 @@ impl Place {
     }
 }
 
+/// From one place to the other in the image, 0 where nothing is seen or there is no place: what passes the eye has none.
+#[inline(always)]
+fn difference(seen: &[f32; BLOCK], a: &Place, b: &Place) -> [[f32; BLOCK]; 2] {
+    let mut differences = [[0.0; BLOCK]; 2];
+    for (axis, numbers) in differences.iter_mut().enumerate() {
+        for (pixel, number) in numbers.iter_mut().enumerate() {
+            let moved = (a.pixel[axis][pixel] - b.pixel[axis][pixel]) as f32;
+            let is_there = (seen[pixel] > 0.0) & (a.depth[pixel] > 0.0) & (b.depth[pixel] > 0.0);
+            *number = if is_there { moved } else { 0.0 };
+        }
+    }
+    differences
+}
+
 /// Points after so many seconds.
 #[inline(always)]
 fn moved(points: &[Numbers; 3], velocity: &[Numbers; 3], seconds: f64) -> [Numbers; 3] {
-    let mut moved = *points;
-    for (moved, velocity) in moved.iter_mut().flatten().zip(velocity.iter().flatten()) {
-        *moved += seconds * velocity;
+    let mut moved = [[0.0; BLOCK]; 3];
+    for (axis, numbers) in moved.iter_mut().enumerate() {
+        for (pixel, number) in numbers.iter_mut().enumerate() {
+            *number = points[axis][pixel] + seconds * velocity[axis][pixel];
+        }
     }
     moved
 }
