@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..fluid.turning import turned
+
 FloatArray = npt.NDArray[np.float32]
 
 
@@ -55,7 +57,7 @@ def transformed_points(points: FloatArray, transform: npt.NDArray[np.float64]) -
 
 def transformed_vectors(vectors: FloatArray, transform: npt.NDArray[np.float64]) -> FloatArray:
     """`vectors` (N, 3) turned and scaled by the linear part of `transform` (4, 4)."""
-    return vectors @ transform[:3, :3].T.astype(np.float32)
+    return turned(vectors, transform[:3, :3].T.astype(np.float32))
 
 
 def mean_scale(transform: npt.NDArray[np.float64]) -> np.float32:

@@ -8,7 +8,7 @@ import bpy
 import gpu
 import numpy as np
 
-from ..fluid.cryptomatte import LAYER
+from ..fluid.cryptomatte import layer_names
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
@@ -32,10 +32,6 @@ def _name_of(image_pass: Pass) -> str:
     return image_pass.blender_name
 
 
-def _matte_names(view_layer: bpy.types.ViewLayer) -> list[str]:
-    return [f"{LAYER}{index:02}" for index in range((cryptomatte_levels(view_layer) + 1) // 2)]
-
-
 class MENISCUS_RE_engine(bpy.types.RenderEngine):
     """Renders the fluid in the light of the scene, with what hides it."""
 
@@ -51,7 +47,7 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
             count = len(image_pass.channels)
             kind = "COLOR" if image_pass.is_color else "VALUE" if count == 1 else "VECTOR"
             self.register_pass(scene, renderlayer, _name_of(image_pass), count, image_pass.channels, kind)
-        for name in _matte_names(renderlayer):
+        for name in layer_names(cryptomatte_levels(renderlayer)):
             self.register_pass(scene, renderlayer, name, 4, _MATTE_CHANNELS, "COLOR")
 
     def view_update(self, _context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:

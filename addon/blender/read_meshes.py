@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ..fluid.lighting import Material
 from ..fluid.meshes import Meshes, MeshObject
+from ..fluid.turning import turned
 from .read_materials import read_material
 from .read_particles import has_particle_systems
 from .visible_sources import ShownTest, settings_of, shown_in_render, shown_in_viewport
@@ -221,9 +222,9 @@ def _placed(arrays: _MeshArrays, world_from_object: npt.NDArray[np.float64]) -> 
     # Cofactors turn normals as the inverse transposed does, and exist for flat transforms too; mirrored ones turn them around.
     cofactors = np.cross(axes[[1, 2, 0]], axes[[2, 0, 1]])
     cofactors /= np.abs(cofactors).max() or 1.0
-    normals = arrays.normals.reshape(-1, 3) @ cofactors.astype(np.float32)
+    normals = turned(arrays.normals.reshape(-1, 3), cofactors.astype(np.float32))
     normals /= np.maximum(np.sqrt(np.einsum("ij,ij->i", normals, normals)), np.float32(1e-30))[:, None]
-    vertices = arrays.vertices @ axes.astype(np.float32) + world_from_object[:3, 3].astype(np.float32)
+    vertices = turned(arrays.vertices, axes.astype(np.float32)) + world_from_object[:3, 3].astype(np.float32)
     return _MeshArrays(vertices, arrays.triangles, normals.reshape(-1, 3, 3), arrays.slots)
 
 

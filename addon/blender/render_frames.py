@@ -206,10 +206,10 @@ class FrameWork:
         self._read = read_view_layer(view_layer.depsgraph, self.job.settings, set_frame)
         self._read.milliseconds.update({**milliseconds, **self._read.milliseconds})
 
-    def render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
+    def render(self, writer: ExrProcess, control: Control) -> None:
         """Render the frame and begin to write it, or keep the failure: on any thread."""
         try:
-            self._render(writer, is_cancelled)
+            self._render(writer, control)
         except MeniscusError as error:
             self._failure = error
 
@@ -218,9 +218,9 @@ class FrameWork:
         if self._failure is not None:
             raise self._failure
 
-    def _render(self, writer: ExrProcess, is_cancelled: Callable[[], bool]) -> None:
+    def _render(self, writer: ExrProcess, control: Control) -> None:
         assert self._read is not None
-        control, job = Control(is_cancelled), self.job
+        job = self.job
         image = self._read.image(control)
         self.report.info, self.report.note = image.info, _note(image)
         if "preview" in self.paths:
@@ -322,6 +322,7 @@ def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[F
     for path in job.paths(job.frames[0]).values():
         prepare_place(path)
     underway: deque[FrameWork] = deque()
+    control = Control(is_cancelled)
     with ExrProcess() as writer:
         is_first = True
         for frame in job.frames:
@@ -332,7 +333,7 @@ def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[F
                     raise CancelledError("The render was cancelled")
                 if work.take():
                     work.read()
-                    yield partial(work.render, writer, is_cancelled)
+                    yield partial(work.render, writer, control)
                     work.check()
                     is_first = False
             except GeneratorExit:

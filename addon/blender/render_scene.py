@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -24,6 +24,7 @@ from ..fluid.meshes import Meshes
 from ..fluid.passes import PASSES
 from ..render.backdrop import backdrop
 from ..render.deep import render_deep
+from ..render.image_memory import ImageMemory
 from ..render.method import timed
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
@@ -107,10 +108,13 @@ class Control:
         Asked again and again; where it returns True, CancelledError is raised.
     on_progress
         Told the share that is done, 0 to 1, and what is being done.
+    memory
+        Where images come from: that of one is used again for the next that is rendered under this control.
     """
 
     is_cancelled: Callable[[], bool]
     on_progress: Callable[[float, str], None] = lambda share, text: None
+    memory: ImageMemory = field(default_factory=ImageMemory)
 
     def watch(self, _share: float) -> None:
         """What native work calls."""
@@ -206,6 +210,7 @@ class SceneRender:
             threads=self.settings.threads,
             backdrop=moment.backdrop(camera, self.settings.threads, control),
             motion=motion,
+            memory=control.memory,
         )
 
     def _antialias(self, image: ImageBuffers, control: Control) -> None:

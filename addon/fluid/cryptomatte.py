@@ -14,6 +14,11 @@ LAYER = "CryptoObject"
 """Blender's name for mattes by object."""
 
 
+def layer_names(levels: int) -> list[str]:
+    """Names of the images that hold the mattes of so many objects a pixel: two objects each."""
+    return [f"{LAYER}{index:02}" for index in range((levels + 1) // 2)]
+
+
 @dataclass(frozen=True)
 class Cryptomatte:
     """Mattes of one image.
@@ -32,8 +37,8 @@ class Cryptomatte:
     @property
     def layers(self) -> dict[str, FloatArray]:
         """(height, width, 4) each, by their names: two ranks a layer, as RGBA."""
-        count = self.ranks.shape[2] // 4
-        return {f"{LAYER}{index:02}": self.ranks[..., 4 * index : 4 * index + 4] for index in range(count)}
+        names = layer_names(self.ranks.shape[2] // 2)
+        return {name: self.ranks[..., 4 * index : 4 * index + 4] for index, name in enumerate(names)}
 
     def metadata(self, view_layer: str) -> dict[str, str]:
         """What a file's header says of the mattes of a view layer."""
@@ -54,11 +59,11 @@ class Coverage:
     Parameters
     ----------
     levels
-        How many objects a pixel can name.
+        How many objects a pixel can name, 1 or more.
     """
 
     def __init__(self, levels: int) -> None:
-        self._levels = max(2, 2 * ((levels + 1) // 2))
+        self._levels = 2 * len(layer_names(levels))
         self._counts: dict[str, npt.NDArray[np.uint16]] = {}
         self._names: dict[str, None] = {}
         self._samples = 0
@@ -67,9 +72,12 @@ class Coverage:
         """Count one sample: (height, width) indices into `names`, -1 where nothing is seen."""
         self._samples += 1
         self._names.update(dict.fromkeys(names))
-        for index in np.unique(objects[objects >= 0]):
-            count = self._counts.setdefault(names[index], np.zeros(objects.shape, np.uint16))
-            count += objects == index
+        for index in np.flatnonzero(np.bincount(objects.reshape(-1) + 1)[1:]):
+            seen = objects == index
+            if names[index] in self._counts:
+                self._counts[names[index]] += seen
+            else:
+                self._counts[names[index]] = seen.astype(np.uint16)
 
     def cryptomatte(self, shape: tuple[int, ...]) -> Cryptomatte:
         """The mattes of what was counted, for an image of the shape (height, width)."""

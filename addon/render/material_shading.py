@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..fluid.camera import Camera
 from ..fluid.lighting import Lighting, Material, Vector
 from . import native
+from .surroundings import Color
 from .vector_math import FloatArray
 
 
@@ -25,7 +26,7 @@ def shade_image(
     materials: tuple[Material, ...],
     lighting: Lighting,
     contrast: FloatArray | None = None,
-    is_over_nothing: bool = False,
+    behind: Color | None = None,
     threads: int = 0,
     watch: Callable[[float], None] = native.let_interrupt,
 ) -> None:
@@ -45,8 +46,8 @@ def shade_image(
         In world space.
     contrast
         (height, width): a factor of the light; None for 1.
-    is_over_nothing
-        Whether nothing is behind, whatever `rgba` holds.
+    behind
+        The one colour of all that is behind, whatever `rgba` holds; None where it differs.
     threads, watch
         As for :class:`method.Request`.
 
@@ -65,7 +66,7 @@ def shade_image(
             None if contrast is None else np.ascontiguousarray(contrast),
             native.view_tuple(camera),
             *_scene(materials, in_view),
-            is_over_nothing=is_over_nothing,
+            behind=behind,
             threads=threads,
             watch=watch,
         )

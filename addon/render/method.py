@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.field import Field
 from ..fluid.passes import DEPTH_BACKGROUND
+from .image_memory import ImageMemory
 
 Backend = Literal["gpu", "cpu"]
 Attribute = Literal["color", "velocity", "ball"]
@@ -58,6 +60,8 @@ class Request:
         How many threads may work on the CPU, 0 for one a core.
     watch
         To be called often with the share of the work that is done, 0 to 1; raises CancelledError when the user gave up.
+    memory
+        Where images come from.
     """
 
     balls: Balls
@@ -66,6 +70,7 @@ class Request:
     attributes: frozenset[Attribute]
     threads: int
     watch: Callable[[float], None]
+    memory: ImageMemory = dataclasses.field(default_factory=ImageMemory)
 
 
 @dataclass
@@ -92,8 +97,8 @@ class Surface:
     color: npt.NDArray[np.float32] | None = None
     velocity: npt.NDArray[np.float32] | None = None
     ball: npt.NDArray[np.int32] | None = None
-    milliseconds: dict[str, float] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
+    milliseconds: dict[str, float] = dataclasses.field(default_factory=dict)
+    counts: dict[str, int] = dataclasses.field(default_factory=dict)
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from .material_shading import shade_image
 from .method import Attribute, Request, Surface
 from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_normals
 from .spans import find_spans
-from .surroundings import Backdrop, Motion
+from .surroundings import Backdrop, Color, Motion
 from .thickness import at_pixels, thickness_image
 
 FloatArray = npt.NDArray[np.float32]
@@ -75,6 +75,7 @@ class PassImages:
         # Where no object is behind, the fluid's passes are whole as they are.
         self._backdrop = backdrop if backdrop is not None and backdrop.names else None
         self._motion = motion
+        self._memory = request.memory
         self._sources = look.sources or (FluidSource(material=Material(color=look.color)),)
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -101,8 +102,9 @@ class PassImages:
     @cached_property
     def _is_before(self) -> BoolArray:
         """Where fluid is nearer than all else, holdouts too."""
-        hit = self._surface.hit
-        return hit if self._backdrop is None else hit & (self._surface.depth < self._backdrop.depth)
+        depth = self._surface.depth
+        hit = np.less(depth, DEPTH_BACKGROUND, out=self._memory.empty(depth.shape, np.bool_))
+        return hit if self._backdrop is None else hit & (depth < self._backdrop.depth)
 
     @cached_property
     def _fluid(self) -> BoolArray:
@@ -126,7 +128,10 @@ class PassImages:
     @cached_property
     def _shown_source(self) -> npt.NDArray[np.int32]:
         """The same, -1 where no fluid shows itself."""
-        return np.where(self._fluid, self._source, np.int32(-1))
+        shown = self._memory.empty(self._fluid.shape, np.int32)
+        shown.fill(-1)
+        np.copyto(shown, self._source, where=self._fluid)
+        return shown
 
     def _of_fluid(self, values: FloatArray, name: str) -> FloatArray:
         """The values of fluid that shows itself, else the pass's background."""
@@ -155,7 +160,7 @@ class PassImages:
     def _places(self) -> dict[str, FloatArray]:
         """The passes that follow from where the surface lies, of those that are asked for."""
         request, shape = self._request, self.hit.shape
-        images = {name: np.empty((*shape, *_PLACES[name]), np.float32) for name in _PLACES if name in self._names}
+        images = {name: self._memory.empty((*shape, *_PLACES[name]), np.float32) for name in _PLACES if name in self._names}
         motion = self._motion or Motion(self._whole_camera, self._whole_camera, 0.0)
         core = native.load()
         with native.translated_errors():
@@ -214,7 +219,7 @@ class PassImages:
 
     def _labelled(self, index: npt.NDArray[np.int32], table: FloatArray, background: float) -> FloatArray:
         """(height, width): the number in a table that each pixel's index stands for, the background where it is negative."""
-        image = np.empty(index.shape, np.float32)
+        image = self._memory.empty(index.shape, np.float32)
         height, width = index.shape
         core, request = native.load(), self._request
         with native.translated_errors():
@@ -234,21 +239,24 @@ class PassImages:
     def _combined(self) -> FloatArray:
         """(height, width, 4): the look, with depth contrast, over what is behind."""
         shown, uses_scene = self._fluid, LOOK_STYLES[self._look.style].uses_scene
-        if self._behind is not None:
-            rgba = np.array(self._behind.rgba, order="C")
+        rgba = self._memory.empty((*shown.shape, 4), np.float32)
+        if self._behind is None:
+            behind: Color | None = (0.0, 0.0, 0.0, 0.0)
         else:
-            rgba = (np.empty if uses_scene else np.zeros)((*shown.shape, 4), np.float32)
+            behind = self._behind.color_behind if self._is_alone else None
+        if behind is None or not uses_scene:
+            rgba[:] = behind if self._behind is None else self._behind.rgba
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
         if uses_scene:
-            self._shade_materials(rgba)
+            self._shade_materials(rgba, behind)
         elif shown.any():
             balls, camera = self._request.balls, self._request.camera
             ranges = Ranges(camera.depth_range(balls.bounds), (0.0, balls.fastest))
             rgba[shown] = shaded(self._points(shown), self._look, ranges).over(rgba[shown])
         return rgba
 
-    def _shade_materials(self, rgba: FloatArray) -> None:
+    def _shade_materials(self, rgba: FloatArray, behind: Color | None) -> None:
         """Lay the fluid's materials over `rgba`."""
         request, surface = self._request, self._surface
         shade_image(
@@ -261,7 +269,7 @@ class PassImages:
             tuple(source.material for source in self._sources),
             self._look.lighting,
             self._contrast,
-            is_over_nothing=self._behind is None,
+            behind=behind,
             threads=request.threads,
             watch=request.watch,
         )

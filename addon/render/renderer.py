@@ -17,6 +17,7 @@ from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES, checked_passes
 from .device_image import DeviceImage
+from .image_memory import ImageMemory
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .pass_images import NEEDED, PassImages
 from .registry import create_method, method_infos
@@ -40,6 +41,7 @@ def render(
     threads: int = 0,
     backdrop: Backdrop | None = None,
     motion: Motion | None = None,
+    memory: ImageMemory | None = None,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -63,6 +65,8 @@ def render(
         What else is seen at each pixel of the camera's region, and hides the fluid where it is nearer; None for nothing.
     motion
         Of the camera, for the Vector pass; None where it stands still.
+    memory
+        That of earlier images, used again where nobody holds these any more; None for fresh memory.
 
     Returns
     -------
@@ -74,7 +78,8 @@ def render(
         Each with one sentence for the user.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
-    shot = replace(shot, backdrop=backdrop, motion=motion)
+    request = shot.request if memory is None else replace(shot.request, memory=memory)
+    shot = replace(shot, request=request, backdrop=backdrop, motion=motion)
     return shot.image(shot.choice.runner.find_surface(shot.request))
 
 

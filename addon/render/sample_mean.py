@@ -21,6 +21,7 @@ class SampleMean:
 
     def __init__(self, coverage: Coverage | None = None) -> None:
         self._coverage = coverage
+        # The first image's own arrays as long as there is but one.
         self._sums: dict[str, npt.NDArray[np.float32]] = {}
         self._count = 0
 
@@ -29,16 +30,18 @@ class SampleMean:
         self._count += 1
         for name, pixels in image.passes.items():
             if PASSES[name].is_antialiased:
-                if name in self._sums:
-                    self._sums[name] += pixels
+                if self._count == 1:
+                    self._sums[name] = pixels
+                elif self._count == 2:
+                    self._sums[name] = self._sums[name] + pixels
                 else:
-                    self._sums[name] = pixels.copy()
+                    self._sums[name] += pixels
         if self._coverage is not None and image.objects is not None:
             self._coverage.add(image.objects, names)
 
     def put_into(self, image: ImageBuffers) -> None:
         """Give an image of the view the means."""
         for name, total in self._sums.items():
-            image.passes[name] = total / np.float32(self._count)
+            image.passes[name] = total if self._count == 1 else total / np.float32(self._count)
         if self._coverage is not None:
             image.cryptomatte = self._coverage.cryptomatte(image.hit.shape)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ..fluid.camera import Camera
 from ..fluid.look import SPEED_COLORS, Look
+from ..fluid.turning import turned
 from .vector_math import FloatArray, dot, fresnel, highlight, schlick, unit
 
 DIELECTRIC = 0.04
@@ -97,7 +98,7 @@ def shaded(points: SurfacePoints, look: Look, ranges: Ranges) -> Shaded:
 
 def view_normals(normal: FloatArray, camera: Camera) -> FloatArray:
     """World-space normals (count, 3) in view space."""
-    return np.asarray(normal @ camera.world_from_view[:3, :3].astype(np.float32))
+    return turned(normal, camera.world_from_view[:3, :3].astype(np.float32))
 
 
 def directions_to_eye(camera: Camera, hit: npt.NDArray[np.bool_]) -> FloatArray:

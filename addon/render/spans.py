@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.field import Field
+from ..fluid.turning import turned
 from .fitted_bvh import FittedBvh, Watch
 from .native import let_interrupt
 from .vector_math import FloatArray
@@ -129,10 +130,10 @@ class _Search:
         if camera.is_perspective:
             plane[:, 2] = -1
             scale = np.sqrt(np.einsum("ij,ij->i", plane, plane))
-            directions = (plane / scale[:, None]) @ turn.T
-            return np.ascontiguousarray(np.broadcast_to(camera.eye, plane.shape)), np.ascontiguousarray(directions), scale
+            directions = turned(plane / scale[:, None], turn.T)
+            return np.ascontiguousarray(np.broadcast_to(camera.eye, plane.shape)), directions, scale
         forward = np.ascontiguousarray(np.broadcast_to(-turn[:, 2], plane.shape))
-        return np.ascontiguousarray(plane @ turn.T + camera.eye), forward, np.ones(len(rows))
+        return turned(plane, turn.T) + camera.eye, forward, np.ones(len(rows))
 
     def spans(self) -> Spans:
         start, end = self._enter.copy(), self._camera.clip_end * self._scale

@@ -11,6 +11,7 @@ from ..fluid.camera import Camera
 from ..fluid.passes import DEPTH_BACKGROUND
 
 FloatArray = npt.NDArray[np.float32]
+Color = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Backdrop:
         (height, width): where what hides the fluid is not seen itself, and leaves the background of each pass.
     names, pass_indices
         Of the objects; none where there is no object at all.
+    color_behind
+        The one colour of `rgba`; None where that differs.
     """
 
     rgba: FloatArray
@@ -43,9 +46,10 @@ class Backdrop:
     is_holdout: npt.NDArray[np.bool_]
     names: tuple[str, ...] = ()
     pass_indices: tuple[int, ...] = ()
+    color_behind: Color | None = None
 
     @classmethod
-    def empty(cls, camera: Camera, rgba: tuple[float, float, float, float] = (0, 0, 0, 0)) -> Backdrop:
+    def empty(cls, camera: Camera, rgba: Color = (0.0, 0.0, 0.0, 0.0)) -> Backdrop:
         """Nothing but one colour, for a camera without region."""
         shape = camera.height, camera.width
         nothing = np.broadcast_to(np.float32(0), (*shape, 3))
@@ -56,6 +60,7 @@ class Backdrop:
             color=nothing,
             object=np.broadcast_to(np.int32(-1), shape),
             is_holdout=np.broadcast_to(np.False_, shape),
+            color_behind=rgba,
         )
 
     @property

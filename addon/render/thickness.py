@@ -16,6 +16,7 @@ from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.field import Field
 from ..fluid.kernels import KERNELS, Kernel
+from ..fluid.turning import turned
 from .depth_contrast import blurred_rows
 
 FloatArray = npt.NDArray[np.float32]
@@ -45,7 +46,7 @@ def thickness_image(balls: Balls, camera: Camera, field: Field) -> FloatArray:
     (height, width) float32 of the whole image, Blender units, at a low resolution: at most LONGEST_SIDE pixels a side.
     """
     coarse = _coarse(camera)
-    in_view = (balls.positions - coarse.eye.astype(np.float32)) @ coarse.world_from_view[:3, :3].astype(np.float32)
+    in_view = turned(balls.positions - coarse.eye.astype(np.float32), coarse.world_from_view[:3, :3].astype(np.float32))
     depth = -in_view[:, 2]
     seen = (depth > coarse.clip_start) & (depth < coarse.clip_end) & (depth > 0)
     scale = depth[seen] if coarse.is_perspective else np.float32(1)

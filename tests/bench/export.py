@@ -74,17 +74,24 @@ def _job(scene: bpy.types.Scene, folder: str, frames: int, passes: tuple[str, ..
     )
 
 
-def _seconds(job: Any) -> list[Any]:
-    from meniscus.addon.blender.render_frames import render_frames
+def _seconds(job: Any, writes: bool = True) -> list[Any]:
+    from meniscus.addon.blender import render_frames
 
+    writer = render_frames.ExrProcess
     start = time.perf_counter()
-    reports = list(render_frames(job, lambda: False))
+    try:
+        if not writes:
+            render_frames.ExrProcess = NoWriter
+        reports = list(render_frames.render_frames(job, lambda: False))
+    finally:
+        render_frames.ExrProcess = writer
     assert not any(report.error for report in reports), reports[0].error
     return [time.perf_counter() - start, reports]
 
 
 def _report_passes(scene: bpy.types.Scene, folder: str) -> None:
-    _, reports = _seconds(_job(scene, folder, 8))
+    # Compressing would take the cores from what is timed.
+    _, reports = _seconds(_job(scene, folder, 8), writes=False)
     stages = {
         name: statistics.median(report.info.milliseconds[name] for report in reports[1:])
         for name in ("build", "cast", "passes")
@@ -93,16 +100,12 @@ def _report_passes(scene: bpy.types.Scene, folder: str) -> None:
 
 
 def _report_writing(scene: bpy.types.Scene, folder: str, frames: int) -> None:
-    from meniscus.addon.blender import render_frames
-
     for samples in (1, 16):
         rates = {}
         for compression in ("ZIP", "ZIPS", "RLE", "NONE"):
             with_files, _ = _seconds(_job(scene, folder, frames, samples=samples, compression=compression))
             rates[compression] = frames / with_files
-        writer, render_frames.ExrProcess = render_frames.ExrProcess, NoWriter
-        without, _ = _seconds(_job(scene, folder, frames, samples=samples))
-        render_frames.ExrProcess = writer
+        without, _ = _seconds(_job(scene, folder, frames, samples=samples), writes=False)
         shares = ", ".join(f"{name} {rate:.2f} ({rate * without / frames:.2f})" for name, rate in rates.items())
         print(f"{samples} samples: without files {frames / without:.2f} frames a second; with files {shares}")
 

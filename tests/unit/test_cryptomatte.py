@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from meniscus.addon.fluid.cryptomatte import Coverage, float_bits, name_hash
+from meniscus.addon.fluid.cryptomatte import Coverage, float_bits, layer_names, name_hash
 
 
 @pytest.mark.parametrize(("name", "number"), [("Cube", 0xA8FCE865), ("Light", 0xC77D43E5), ("object", 0x055EC73D)])
@@ -37,6 +37,11 @@ def test_ranks_begin_with_the_object_that_covers_most():
     np.testing.assert_array_equal(matte.ranks[0, 2, :4], [far, 0.75, near, 0.25])
     assert list(matte.layers) == ["CryptoObject00", "CryptoObject01", "CryptoObject02"]
     np.testing.assert_array_equal(matte.layers["CryptoObject01"][0, 0], [0, 0, 0, 0])
+
+
+def test_odd_numbers_of_objects_fill_whole_layers():
+    assert [len(layer_names(levels)) for levels in (0, 1, 2, 3, 6)] == [0, 1, 1, 2, 3]
+    assert Coverage(3).cryptomatte((2, 1)).ranks.shape == (2, 1, 8)
 
 
 def test_the_header_names_all_objects():

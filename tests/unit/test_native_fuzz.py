@@ -125,10 +125,11 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "lights": lambda sizes: st.lists(LIGHTS, max_size=3),
     "world": lambda sizes: array("f4", 0, 1, 3).map(lambda numbers: numbers.tolist()),
     "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
+    "behind": lambda sizes: st.none() | st.tuples(*[st.floats(width=32)] * 4),
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
-FLAGS = ("is_perspective", "is_over_nothing", "overlapping", "fits", "tightens", "discards", "proves")
+FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves")
 FITTING["coefficients"] = FITTING["kernel"]
 FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}

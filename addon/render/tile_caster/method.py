@@ -81,15 +81,15 @@ def create() -> TileCaster:
 def _unfilled(request: Request) -> Surface:
     """A surface whose every pixel the native core writes."""
     shape = (request.camera.height, request.camera.width)
-    balls, attributes = request.balls, request.attributes
+    balls, attributes, memory = request.balls, request.attributes, request.memory
 
     def vectors(is_wanted: bool) -> npt.NDArray[np.float32] | None:
-        return np.empty((*shape, 3), np.float32) if is_wanted else None
+        return memory.empty((*shape, 3), np.float32) if is_wanted else None
 
     return Surface(
-        depth=np.empty(shape, np.float32),
-        normal=np.empty((*shape, 3), np.float32),
+        depth=memory.empty(shape, np.float32),
+        normal=memory.empty((*shape, 3), np.float32),
         color=vectors("color" in attributes and balls.colors is not None),
         velocity=vectors("velocity" in attributes and balls.velocities is not None),
-        ball=np.empty(shape, np.int32) if "ball" in attributes else None,
+        ball=memory.empty(shape, np.int32) if "ball" in attributes else None,
     )

@@ -1,13 +1,14 @@
 //! What follows from where the surface of an image lies: positions, how it faces the eye, and how it moves in the image.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::job::Job;
+use crate::memory::with_capacity;
+use crate::simd::{Path, Simd, Task};
 pub use crate::tile_caster::View;
-
-/// Rows that a thread fills at a time.
-const ROWS: usize = 8;
 
 /// Pixels that a thread labels at a time.
 const LABELS: usize = 1 << 14;
@@ -49,31 +50,45 @@ pub struct Places<'a> {
     pub speed: &'a mut [f32],
 }
 
+impl<'a> Places<'a> {
+    /// The same, row by row.
+    fn rows(self, view: &View) -> Result<Vec<Places<'a>>> {
+        let width = view.width;
+        let mut rows = with_capacity(view.height)?;
+        let mut position = self.position.chunks_mut(width);
+        let mut facing = self.facing.chunks_mut(width);
+        let mut vector = self.vector.chunks_mut(width);
+        let mut speed = self.speed.chunks_mut(width);
+        rows.extend((0..view.height).map(|_| Places {
+            position: position.next().unwrap_or_default(),
+            facing: facing.next().unwrap_or_default(),
+            vector: vector.next().unwrap_or_default(),
+            speed: speed.next().unwrap_or_default(),
+        }));
+        Ok(rows)
+    }
+}
+
 /// Fills the images of a surface that a view sees.
 ///
 /// # Errors
 /// `InvalidInput` where sizes differ or a camera is unusable, `Cancelled`.
-pub fn place(view: &View, surface: Surface<'_>, motion: Motion<'_>, places: Places<'_>, job: &Job) -> Result<()> {
+pub fn place(path: Path, view: &View, surface: Surface<'_>, motion: Motion<'_>, places: Places<'_>, job: &Job) -> Result<()> {
     for camera in [view, motion.previous, motion.following] {
         camera.check()?;
     }
     let pixels = view.width * view.height;
     let fits = |count: usize| [0, pixels].contains(&count);
-    let Places { position, facing, vector, speed } = places;
+    let Places { position, facing, vector, speed } = &places;
     let sizes_fit = [position.len(), facing.len(), vector.len(), speed.len(), surface.velocity.len()].into_iter().all(fits);
     if !sizes_fit || surface.depth.len() != pixels || surface.normal.len() != pixels {
         return Err(Error::InvalidInput("the images must have the size of the camera's".into()));
     }
-    let chunk = ROWS * view.width;
-    job.expect(4 * view.height.div_ceil(ROWS));
-    let placing = Placing { view, surface, motion };
-    // One image after the other: each is written in order.
-    fill(position, chunk, job, |pixel| placing.position(pixel).map_or([0.0; 3], |point| point.map(|part| part as f32)))?;
-    fill(facing, chunk, job, |pixel| placing.facing(pixel))?;
-    fill(vector, chunk, job, |pixel| placing.vector(pixel))?;
-    fill(speed, chunk, job, |pixel| {
-        let [x, y, z] = surface.velocity.get(pixel).copied().unwrap_or_default();
-        (x * x + y * y + z * z).sqrt()
+    let rows = places.rows(view)?;
+    job.expect(view.height);
+    rows.into_par_iter().enumerate().try_for_each(|(row, places)| {
+        path.dispatch(RowTask { view, surface, motion: &motion, row, places });
+        job.advance(1)
     })
 }
 
@@ -97,83 +112,226 @@ pub fn label(ball: &[i32], table: &[f32], background: f32, image: &mut [f32], jo
     })
 }
 
-fn fill<T: Send>(image: &mut [T], chunk: usize, job: &Job, value: impl Fn(usize) -> T + Sync) -> Result<()> {
-    image.par_chunks_mut(chunk).enumerate().try_for_each(|(index, part)| {
-        for (offset, target) in part.iter_mut().enumerate() {
-            *target = value(index * chunk + offset);
-        }
-        job.advance(1)
-    })
-}
+/// Pixels that are placed at a time: few enough for their numbers to stay in the nearest cache.
+const BLOCK: usize = 64;
 
-struct Placing<'a> {
+/// A number of each pixel of a block. Loops over these become vectors on every path.
+type Numbers = [f64; BLOCK];
+
+/// Places a row of an image.
+struct RowTask<'a> {
     view: &'a View,
     surface: Surface<'a>,
-    motion: Motion<'a>,
+    motion: &'a Motion<'a>,
+    row: usize,
+    places: Places<'a>,
 }
 
-impl Placing<'_> {
-    /// The planar depth and the place in the window of a pixel that sees something.
+impl Task for RowTask<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn seen(&self, pixel: usize) -> Option<(f64, [f64; 2])> {
-        let depth = self.surface.depth[pixel];
-        let place = || self.view.pixel_center(pixel % self.view.width, pixel / self.view.width);
-        (depth < self.surface.background).then(|| (f64::from(depth), place()))
+    fn run<S: Simd>(mut self, _: S) {
+        for start in (0..self.view.width).step_by(BLOCK) {
+            let part = start..(start + BLOCK).min(self.view.width);
+            let block = Block::new(self.view, &self.surface, self.row, part.clone());
+            let Places { position, facing, vector, speed } = &mut self.places;
+            if !position.is_empty() {
+                block.put_positions(&mut position[part.clone()]);
+            }
+            if !facing.is_empty() {
+                block.put_facing(&mut facing[part.clone()]);
+            }
+            if !vector.is_empty() {
+                block.put_vectors(self.motion, &mut vector[part.clone()]);
+            }
+            if !speed.is_empty() {
+                block.put_speeds(&mut speed[part]);
+            }
+        }
+    }
+}
+
+/// What is known of the pixels of a part of a row; the last ones may be beyond its end.
+struct Block<'a> {
+    view: &'a View,
+    is_empty: bool,
+    /// 1 where there is something, else 0.
+    seen: [f32; BLOCK],
+    depth: Numbers,
+    /// Where in the window the pixels' centres lie.
+    x: Numbers,
+    y: f64,
+    point: [Numbers; 3],
+    normal: &'a [[f32; 3]],
+    velocity: &'a [[f32; 3]],
+}
+
+impl<'a> Block<'a> {
+    #[inline(always)]
+    fn new(view: &'a View, surface: &Surface<'a>, row: usize, part: Range<usize>) -> Self {
+        let pixels = row * view.width + part.start..row * view.width + part.end;
+        let (mut seen, mut depth, mut x) = ([0.0; BLOCK], [1.0; BLOCK], [0.0; BLOCK]);
+        for ((seen, depth), found) in seen.iter_mut().zip(&mut depth).zip(&surface.depth[pixels.clone()]) {
+            let is_seen = *found < surface.background;
+            *seen = if is_seen { 1.0 } else { 0.0 };
+            *depth = if is_seen { f64::from(*found) } else { 1.0 };
+        }
+        let size = view.pixel_size();
+        let first = part.start as f64;
+        for (offset, x) in x.iter_mut().enumerate() {
+            *x = view.window[0] + (first + f64::from(offset as i32) + 0.5) * size[0];
+        }
+        let y = view.window[2] + (row as f64 + 0.5) * size[1];
+        let is_empty = seen.iter().all(|seen| *seen == 0.0);
+        let velocity = if surface.velocity.is_empty() { &[] } else { &surface.velocity[pixels.clone()] };
+        let mut block =
+            Self { view, is_empty, seen, depth, x, y, point: [[0.0; BLOCK]; 3], normal: &surface.normal[pixels], velocity };
+        if !is_empty {
+            block.find_points();
+        }
+        block
     }
 
     #[inline(always)]
-    fn position(&self, pixel: usize) -> Option<[f64; 3]> {
-        let (depth, [x, y]) = self.seen(pixel)?;
-        let scale = if self.view.is_perspective { depth } else { 1.0 };
+    fn find_points(&mut self) {
         let [right, up, forward] = self.view.camera_from_world;
-        Some([0, 1, 2].map(|axis| self.view.eye[axis] + x * scale * right[axis] + y * scale * up[axis] + depth * forward[axis]))
+        for (axis, numbers) in self.point.iter_mut().enumerate() {
+            let eye = self.view.eye[axis];
+            for ((point, x), depth) in numbers.iter_mut().zip(&self.x).zip(&self.depth) {
+                let scale = if self.view.is_perspective { *depth } else { 1.0 };
+                *point = eye + x * scale * right[axis] + self.y * scale * up[axis] + depth * forward[axis];
+            }
+        }
     }
 
     #[inline(always)]
-    fn facing(&self, pixel: usize) -> f32 {
-        let Some((_, [x, y])) = self.seen(pixel) else { return 0.0 };
-        let normal = self.surface.normal[pixel].map(f64::from);
-        let [right, up, forward] = self.view.camera_from_world.map(|row| dot(row, normal));
-        let (along, length) = if self.view.is_perspective {
-            (x * right + y * up + forward, (x * x + y * y + 1.0).sqrt())
-        } else {
-            (forward, 1.0)
-        };
-        (along / length).abs() as f32
+    fn put_positions(&self, target: &mut [[f32; 3]]) {
+        if self.is_empty {
+            return target.fill([0.0; 3]);
+        }
+        let mut positions = [[0.0; 3]; BLOCK];
+        let [x, y, z] = &self.point;
+        for (pixel, position) in positions.iter_mut().enumerate() {
+            let is_seen = self.seen[pixel] > 0.0;
+            *position = [x[pixel], y[pixel], z[pixel]].map(|number| if is_seen { number as f32 } else { 0.0 });
+        }
+        target.copy_from_slice(&positions[..target.len()]);
     }
 
     #[inline(always)]
-    fn vector(&self, pixel: usize) -> [f32; 4] {
-        let Some(here) = self.position(pixel) else { return [0.0; 4] };
-        let velocity = self.surface.velocity.get(pixel).map_or([0.0; 3], |velocity| velocity.map(f64::from));
-        let moved = |seconds: f64| [0, 1, 2].map(|axis| here[axis] + seconds * velocity[axis]);
-        let now = pixels_of(self.view, here);
-        let before = pixels_of(self.motion.previous, moved(-self.motion.seconds));
-        let after = pixels_of(self.motion.following, moved(self.motion.seconds));
-        let difference = |a: Option<[f64; 2]>, b: Option<[f64; 2]>| match (a, b) {
-            (Some(a), Some(b)) => [(a[0] - b[0]) as f32, (a[1] - b[1]) as f32],
-            // What passes the eye has no place in the other frame's image.
-            _ => [0.0; 2],
-        };
-        let (past, future) = (difference(before, now), difference(now, after));
-        [past[0], past[1], future[0], future[1]]
+    fn put_facing(&self, target: &mut [f32]) {
+        if self.is_empty {
+            return target.fill(0.0);
+        }
+        let [nx, ny, nz] = columns(self.normal);
+        let rows = self.view.camera_from_world;
+        let mut facing = [0.0; BLOCK];
+        for (pixel, facing) in facing.iter_mut().enumerate() {
+            let normal = [nx[pixel], ny[pixel], nz[pixel]];
+            let [right, up, forward] = [dot(rows[0], normal), dot(rows[1], normal), dot(rows[2], normal)];
+            let (x, y) = (self.x[pixel], self.y);
+            let (along, length) = if self.view.is_perspective {
+                (x * right + y * up + forward, (x * x + y * y + 1.0).sqrt())
+            } else {
+                (forward, 1.0)
+            };
+            *facing = if self.seen[pixel] > 0.0 { (along / length).abs() as f32 } else { 0.0 };
+        }
+        target.copy_from_slice(&facing[..target.len()]);
+    }
+
+    #[inline(always)]
+    fn put_vectors(&self, motion: &Motion<'_>, target: &mut [[f32; 4]]) {
+        let stands_still = self.velocity.is_empty() && *self.view == *motion.previous && *self.view == *motion.following;
+        if self.is_empty || stands_still {
+            return target.fill([0.0; 4]);
+        }
+        let velocity = columns(self.velocity);
+        let now = Place::of(self.view, &self.point);
+        let before = Place::of(motion.previous, &moved(&self.point, &velocity, -motion.seconds));
+        let after = Place::of(motion.following, &moved(&self.point, &velocity, motion.seconds));
+        let mut vectors = [[0.0; 4]; BLOCK];
+        let (past, future) = (difference(&self.seen, &before, &now), difference(&self.seen, &now, &after));
+        for (pixel, vector) in vectors.iter_mut().enumerate() {
+            *vector = [past[0][pixel], past[1][pixel], future[0][pixel], future[1][pixel]];
+        }
+        target.copy_from_slice(&vectors[..target.len()]);
+    }
+
+    #[inline(always)]
+    fn put_speeds(&self, target: &mut [f32]) {
+        target.fill(0.0);
+        for (speed, [x, y, z]) in target.iter_mut().zip(self.velocity) {
+            *speed = (x * x + y * y + z * z).sqrt();
+        }
     }
 }
 
-/// Where a camera sees a point, in pixels from its lower left; none beside the eye or behind it.
+/// Where a camera sees the points of a block.
+struct Place {
+    /// From the image's lower left.
+    pixel: [Numbers; 2],
+    /// Planar, 1 for a camera of parallel rays; the place means nothing where this is not above 0.
+    depth: Numbers,
+}
+
+impl Place {
+    #[inline(always)]
+    fn of(view: &View, points: &[Numbers; 3]) -> Self {
+        let mut place = Self { pixel: [[0.0; BLOCK]; 2], depth: [1.0; BLOCK] };
+        let [width, height] = view.pixel_size();
+        let [right, up, forward] = view.camera_from_world;
+        for (pixel, place_depth) in place.depth.iter_mut().enumerate() {
+            let offset = [0, 1, 2].map(|axis| points[axis][pixel] - view.eye[axis]);
+            let depth = if view.is_perspective { dot(forward, offset) } else { 1.0 };
+            let scale = if view.is_perspective { 1.0 / depth } else { 1.0 };
+            place.pixel[0][pixel] = (dot(right, offset) * scale - view.window[0]) / width;
+            place.pixel[1][pixel] = (dot(up, offset) * scale - view.window[2]) / height;
+            *place_depth = depth;
+        }
+        place
+    }
+}
+
+/// From one place to the other in the image, 0 where nothing is seen or there is no place: what passes the eye has none.
 #[inline(always)]
-fn pixels_of(view: &View, point: [f64; 3]) -> Option<[f64; 2]> {
-    let offset = [0, 1, 2].map(|axis| point[axis] - view.eye[axis]);
-    let [x, y, depth] = view.camera_from_world.map(|row| dot(row, offset));
-    let scale = if !view.is_perspective {
-        1.0
-    } else if depth > 0.0 {
-        1.0 / depth
-    } else {
-        return None;
-    };
-    let [width, height] = view.pixel_size();
-    Some([(x * scale - view.window[0]) / width, (y * scale - view.window[2]) / height])
+fn difference(seen: &[f32; BLOCK], a: &Place, b: &Place) -> [[f32; BLOCK]; 2] {
+    let mut differences = [[0.0; BLOCK]; 2];
+    for (axis, numbers) in differences.iter_mut().enumerate() {
+        for (pixel, number) in numbers.iter_mut().enumerate() {
+            let moved = (a.pixel[axis][pixel] - b.pixel[axis][pixel]) as f32;
+            let is_there = (seen[pixel] > 0.0) & (a.depth[pixel] > 0.0) & (b.depth[pixel] > 0.0);
+            *number = if is_there { moved } else { 0.0 };
+        }
+    }
+    differences
+}
+
+/// Points after so many seconds.
+#[inline(always)]
+fn moved(points: &[Numbers; 3], velocity: &[Numbers; 3], seconds: f64) -> [Numbers; 3] {
+    let mut moved = [[0.0; BLOCK]; 3];
+    for (axis, numbers) in moved.iter_mut().enumerate() {
+        for (pixel, number) in numbers.iter_mut().enumerate() {
+            *number = points[axis][pixel] + seconds * velocity[axis][pixel];
+        }
+    }
+    moved
+}
+
+/// The coordinates of up to a block of vectors, 0 for those that lack.
+#[inline(always)]
+fn columns(vectors: &[[f32; 3]]) -> [Numbers; 3] {
+    let mut padded = [[0.0; 3]; BLOCK];
+    padded[..vectors.len()].copy_from_slice(vectors);
+    let mut columns = [[0.0; BLOCK]; 3];
+    for (pixel, vector) in padded.iter().enumerate() {
+        for axis in 0..3 {
+            columns[axis][pixel] = f64::from(vector[axis]);
+        }
+    }
+    columns
 }
 
 #[inline(always)]
@@ -207,7 +365,7 @@ mod tests {
             let (mut position, mut facing, mut vector, mut speed) = ([[9.0; 3]; 8], [9.0; 8], [[9.0; 4]; 8], [9.0; 8]);
             let places = Places { position: &mut position, facing: &mut facing, vector: &mut vector, speed: &mut speed };
             let motion = Motion { previous: &cameras[1], following: &cameras[2], seconds: 0.5 };
-            place(&cameras[0], surface, motion, places, &Job::default()).unwrap();
+            place(Path::Portable, &cameras[0], surface, motion, places, &Job::default()).unwrap();
             // The pixel's centre is (0.25, 0.25) in the window, a pixel is 0.5 wide.
             let scale = if is_perspective { 4.0 } else { 1.0 };
             assert_eq!(position[6], [0.25 * scale, -1.0, 0.25 * scale]);
@@ -228,7 +386,7 @@ mod tests {
         let mut vector = [[9.0; 4]; 8];
         let places = Places { position: &mut [], facing: &mut [], vector: &mut vector, speed: &mut [] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
-        place(&camera, surface, motion, places, &Job::default()).unwrap();
+        place(Path::Portable, &camera, surface, motion, places, &Job::default()).unwrap();
         assert_eq!(vector[0][..2], [0.0; 2]);
         assert!(vector[0][2] != 0.0);
     }
@@ -248,6 +406,6 @@ mod tests {
         let surface = Surface { depth: &[1.0; 8], background: 1e10, normal: &[[0.0; 3]; 8], velocity: &[] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
         let places = Places { position: &mut [], facing: &mut [0.0; 7], vector: &mut [], speed: &mut [] };
-        assert!(place(&camera, surface, motion, places, &Job::default()).is_err());
+        assert!(place(Path::Portable, &camera, surface, motion, places, &Job::default()).is_err());
     }
 }

@@ -21,10 +21,10 @@ type LightArguments = (String, [f32; 3], [f32; 3], [f32; 3], f32, [f32; 2]);
 ///
 /// rgba (height, width, 4): premultiplied, what is behind, then what is seen. depth (height, width), normal (height, width, 3)
 /// in world space, color (height, width, 3): float32. material (height, width) int32: index, negative where nothing is shaded.
-/// contrast (height, width) float32: factor of the light, or None. Lights are in view space, z to the eye. is_over_nothing: that
-/// nothing is behind, whatever rgba holds.
+/// contrast (height, width) float32: factor of the light, or None. Lights are in view space, z to the eye. behind: the one
+/// colour of all that is behind, whatever rgba holds, or None.
 #[pyfunction]
-#[pyo3(signature = (rgba, depth, normal, color, material, contrast, view, materials, lights, world, is_over_nothing=false,
+#[pyo3(signature = (rgba, depth, normal, color, material, contrast, view, materials, lights, world, behind=None,
                     threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub fn shade_image(
@@ -39,7 +39,7 @@ pub fn shade_image(
     materials: Vec<MaterialArguments>,
     lights: Vec<LightArguments>,
     world: [f32; 3],
-    is_over_nothing: bool,
+    behind: Option<[f32; 4]>,
     threads: usize,
     watch: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<()> {
@@ -60,7 +60,7 @@ pub fn shade_image(
         material: material.numbers(),
         contrast: contrast.as_ref().map_or(&[], |contrast| contrast.numbers()),
         rgba: rgba.numbers().map_err(python_error)?.as_chunks_mut().0,
-        is_over_nothing,
+        behind,
     };
     let path = Path::chosen().map_err(python_error)?;
     run(python, threads, watch, |job| shading::shade_image(path, &view, &scene, image, job))
@@ -153,7 +153,8 @@ pub fn place(
         speed: written(&mut speed)?,
     };
     let motion = Motion { previous: &previous, following: &following, seconds };
-    run(python, threads, watch, |job| placing::place(&view, surface, motion, places, job))
+    let path = Path::chosen().map_err(python_error)?;
+    run(python, threads, watch, |job| placing::place(path, &view, surface, motion, places, job))
 }
 
 /// Gives each pixel the number of its ball.

@@ -1,6 +1,7 @@
 //! The light of sixteen points.
 
 use std::f32::consts::PI;
+use std::ops::{Add, Mul, Sub};
 
 use super::Scene;
 use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
@@ -51,6 +52,8 @@ pub struct Light {
 }
 
 /// Three vectors of lanes: coordinates, or channels.
+///
+/// No closure works on vectors here: one that is not inlined is compiled without the path's instructions.
 pub struct Triple<S: Simd>(pub [S::Vector; 3]);
 
 impl<S: Simd> Clone for Triple<S> {
@@ -63,9 +66,10 @@ impl<S: Simd> Clone for Triple<S> {
 impl<S: Simd> Copy for Triple<S> {}
 
 impl<S: Simd> Triple<S> {
+    /// The same numbers in every lane.
     #[inline(always)]
-    fn splat(simd: S, numbers: [f32; 3]) -> Self {
-        Self(numbers.map(|number| simd.splat(number)))
+    pub fn splat(simd: S, numbers: [f32; 3]) -> Self {
+        Self([simd.splat(numbers[0]), simd.splat(numbers[1]), simd.splat(numbers[2])])
     }
 
     /// The scalar product.
@@ -77,15 +81,34 @@ impl<S: Simd> Triple<S> {
 
     #[inline(always)]
     fn scaled(self, factor: S::Vector) -> Self {
-        Self(self.0.map(|part| part * factor))
+        let [a, b, c] = self.0;
+        Self([a * factor, b * factor, c * factor])
     }
 
+    /// `self + factor * (1 - self)`: what reflects beside a part that does.
     #[inline(always)]
-    fn zipped(self, other: Self, operation: impl Fn(S::Vector, S::Vector) -> S::Vector) -> Self {
-        let ([a, b, c], [d, e, f]) = (self.0, other.0);
-        Self([operation(a, d), operation(b, e), operation(c, f)])
+    fn beside(self, one: S::Vector, factor: Self) -> Self {
+        let ([a, b, c], [d, e, f]) = (self.0, factor.0);
+        Self([a + (one - a) * d, b + (one - b) * e, c + (one - c) * f])
     }
 }
+
+macro_rules! by_part {
+    ($trait:ident, $method:ident, $operator:tt) => {
+        impl<S: Simd> $trait for Triple<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let ([a, b, c], [d, e, f]) = (self.0, other.0);
+                Self([a $operator d, b $operator e, c $operator f])
+            }
+        }
+    };
+}
+
+by_part!(Add, add, +);
+by_part!(Sub, sub, -);
+by_part!(Mul, mul, *);
 
 /// What a surface sends to the eye.
 pub struct Shaded<S: Simd> {
@@ -107,22 +130,15 @@ struct Parameters<S: Simd> {
 impl<S: Simd> Parameters<S> {
     #[inline(always)]
     fn gathered(simd: S, materials: &[Material], indices: &[usize; LANES]) -> Self {
-        let get = |parameter: fn(&Material) -> f32| {
-            let mut lanes = Lanes::splat(0.0);
-            for (lane, index) in lanes.0.iter_mut().zip(indices) {
-                *lane = parameter(&materials[*index]);
-            }
-            simd.load(&lanes)
-        };
         Self {
-            metallic: get(|material| material.metallic),
-            roughness: get(|material| material.roughness),
-            transmission: get(|material| material.transmission),
-            ior: get(|material| material.ior),
+            metallic: gathered(simd, materials, indices, |material| material.metallic),
+            roughness: gathered(simd, materials, indices, |material| material.roughness),
+            transmission: gathered(simd, materials, indices, |material| material.transmission),
+            ior: gathered(simd, materials, indices, |material| material.ior),
             emission: Triple([
-                get(|material| material.emission[0]),
-                get(|material| material.emission[1]),
-                get(|material| material.emission[2]),
+                gathered(simd, materials, indices, |material| material.emission[0]),
+                gathered(simd, materials, indices, |material| material.emission[1]),
+                gathered(simd, materials, indices, |material| material.emission[2]),
             ]),
         }
     }
@@ -136,10 +152,12 @@ impl<S: Simd> Parameters<S> {
         let grazing = one - cosine;
         let squared = grazing * grazing;
         let grazing = squared * squared * grazing;
-        Triple(base.0.map(|channel| {
-            let metal = channel + (one - channel) * grazing;
-            dielectric + self.metallic * (metal - dielectric)
-        }))
+        let mut reflected = base;
+        for channel in &mut reflected.0 {
+            let metal = *channel + (one - *channel) * grazing;
+            *channel = dielectric + self.metallic * (metal - dielectric);
+        }
+        reflected
     }
 
     /// What of unpolarized light a smooth dielectric reflects.
@@ -153,6 +171,24 @@ impl<S: Simd> Parameters<S> {
     }
 }
 
+/// A parameter of sixteen materials; nearly always these are one.
+#[inline(always)]
+fn gathered<S: Simd>(
+    simd: S,
+    materials: &[Material],
+    indices: &[usize; LANES],
+    parameter: impl Fn(&Material) -> f32,
+) -> S::Vector {
+    if *indices == [indices[0]; LANES] {
+        return simd.splat(parameter(&materials[indices[0]]));
+    }
+    let mut lanes = Lanes::splat(0.0);
+    for (lane, index) in lanes.0.iter_mut().zip(indices) {
+        *lane = parameter(&materials[*index]);
+    }
+    simd.load(&lanes)
+}
+
 /// Sixteen numbers, or fewer and zeros.
 #[inline(always)]
 pub fn numbers<S: Simd>(simd: S, numbers: &[f32]) -> S::Vector {
@@ -164,8 +200,9 @@ pub fn numbers<S: Simd>(simd: S, numbers: &[f32]) -> S::Vector {
 /// Sixteen vectors, or fewer and zeros.
 #[inline(always)]
 pub fn triples<S: Simd>(simd: S, triples: &[[f32; 3]]) -> Triple<S> {
-    let mut lanes = [Lanes::splat(0.0); 3];
-    for (lane, triple) in triples.iter().enumerate() {
+    let (mut padded, mut lanes) = ([[0.0; 3]; LANES], [Lanes::splat(0.0); 3]);
+    padded[..triples.len()].copy_from_slice(triples);
+    for (lane, triple) in padded.iter().enumerate() {
         for axis in 0..3 {
             lanes[axis].0[lane] = triple[axis];
         }
@@ -189,25 +226,24 @@ pub fn shade<S: Simd>(
     let body = one - parameters.metallic;
     let matt = base.scaled(body * (one - parameters.transmission));
     let reflected = parameters.reflected(simd, normal.dot(to_eye), base);
-    let world = Triple::splat(simd, scene.world);
-    let soft = matt.zipped(reflected, |matt, reflected| reflected + (one - reflected) * matt);
-    let mut radiance = parameters.emission.zipped(soft.zipped(world, |soft, world| soft * world), |a, b| a + b);
+    let (world, white) = (Triple::splat(simd, scene.world), Triple::splat(simd, [1.0; 3]));
+    let mut radiance = parameters.emission + reflected.beside(one, matt) * world;
     for light in scene.lights {
         let (toward, irradiance) = shine(simd, light, position);
         let facing = normal.dot(toward).max(zero);
         if !zero.lt(facing).any() {
             continue;
         }
-        let between = unit(simd, to_eye.zipped(toward, |a, b| a + b));
+        let between = unit(simd, to_eye + toward);
         let near = toward.dot(between);
         let mirrored = parameters.reflected(simd, near, base);
         let gloss = facets(simd, parameters.roughness, normal.dot(between), near, facing);
         let diffuse = facing * simd.splat(1.0 / PI);
-        let sent = matt.zipped(mirrored, |matt, mirrored| (one - mirrored) * matt * diffuse + mirrored * gloss);
-        radiance = radiance.zipped(sent.zipped(irradiance, |sent, irradiance| sent * irradiance), |a, b| a + b);
+        let sent = ((white - mirrored) * matt).scaled(diffuse) + mirrored.scaled(gloss);
+        radiance = radiance + sent * irradiance;
     }
     let clear = body * parameters.transmission;
-    let transmittance = base.zipped(reflected, |base, reflected| (one - reflected) * clear * base);
+    let transmittance = (white - reflected).scaled(clear) * base;
     Shaded { radiance, transmittance }
 }
 
@@ -234,7 +270,7 @@ fn shine<S: Simd>(simd: S, light: &Light, position: Triple<S>) -> (Triple<S>, Tr
     if light.kind == LightKind::Sun {
         return (back, power);
     }
-    let way = Triple::splat(simd, light.position).zipped(position, |light, point| light - point);
+    let way = Triple::splat(simd, light.position) - position;
     let squared = way.dot(way).max(simd.splat(1e-12));
     let toward = way.scaled(one / squared.sqrt());
     let cosine = toward.dot(back);

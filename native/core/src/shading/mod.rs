@@ -58,8 +58,8 @@ pub struct Image<'a> {
     pub contrast: &'a [f32],
     /// Premultiplied: what is behind, then what is seen.
     pub rgba: &'a mut [[f32; 4]],
-    /// Whether there is nothing behind, whatever `rgba` holds.
-    pub is_over_nothing: bool,
+    /// The one colour of all that is behind, whatever `rgba` holds.
+    pub behind: Option<[f32; 4]>,
 }
 
 /// Points to be shaded: positions, unit normals, and unit directions to the eye, which the normals face.
@@ -90,12 +90,9 @@ pub fn shade_image(path: Path, view: &View, scene: &Scene<'_>, image: Image<'_>,
     }
     check_materials(scene, image.material)?;
     job.expect(view.height);
-    let Image { depth, normal, color, material, contrast, rgba, is_over_nothing } = image;
+    let Image { depth, normal, color, material, contrast, rgba, behind } = image;
     rgba.par_chunks_mut(view.width).enumerate().try_for_each(|(row, rgba)| {
         let line = row * view.width..(row + 1) * view.width;
-        if is_over_nothing {
-            rgba.fill([0.0; 4]);
-        }
         path.dispatch(RowTask {
             view,
             scene,
@@ -106,6 +103,7 @@ pub fn shade_image(path: Path, view: &View, scene: &Scene<'_>, image: Image<'_>,
             material: &material[line.clone()],
             contrast: if contrast.is_empty() { contrast } else { &contrast[line] },
             rgba,
+            behind,
         });
         job.advance(1)
     })
@@ -148,6 +146,7 @@ struct RowTask<'a> {
     material: &'a [i32],
     contrast: &'a [f32],
     rgba: &'a mut [[f32; 4]],
+    behind: Option<[f32; 4]>,
 }
 
 impl Task for RowTask<'_> {
@@ -157,7 +156,13 @@ impl Task for RowTask<'_> {
     fn run<S: Simd>(mut self, simd: S) {
         for start in (0..self.depth.len()).step_by(LANES) {
             let count = LANES.min(self.depth.len() - start);
-            if self.material[start..start + count].iter().any(|index| *index >= 0) {
+            let material = &self.material[start..start + count];
+            if let Some(behind) = self.behind
+                && material.iter().any(|index| *index < 0)
+            {
+                self.rgba[start..start + count].fill(behind);
+            }
+            if material.iter().any(|index| *index >= 0) {
                 self.shade(simd, start, count);
             }
         }
@@ -190,9 +195,9 @@ impl RowTask<'_> {
     /// Positions, and directions to the eye: view space, z to the eye.
     #[inline(always)]
     fn geometry<S: Simd>(&self, simd: S, start: usize, count: usize) -> [Triple<S>; 2] {
-        let mut columns = Lanes::splat(0.0);
+        let (mut columns, size) = (Lanes::splat(0.0), self.view.pixel_size());
         for (lane, x) in columns.0.iter_mut().enumerate() {
-            *x = self.view.pixel_center(start + lane, self.row)[0] as f32;
+            *x = (self.view.window[0] + (start as f64 + f64::from(lane as i32) + 0.5) * size[0]) as f32;
         }
         let (x, y) = (simd.load(&columns), simd.splat(self.view.pixel_center(0, self.row)[1] as f32));
         let depth = material::numbers(simd, &self.depth[start..start + count]);
@@ -209,14 +214,19 @@ impl RowTask<'_> {
     #[inline(always)]
     fn normals<S: Simd>(&self, simd: S, start: usize, count: usize, to_eye: Triple<S>) -> Triple<S> {
         let world = material::triples(simd, &self.normal[start..start + count]);
-        let [right, up, forward] = self.view.camera_from_world.map(|row| {
-            let axis = row.map(|number| simd.splat(number as f32));
-            Triple(axis).dot(world)
-        });
+        let [right, up, forward] = self.view.camera_from_world.map(|row| row.map(|number| number as f32));
+        let [right, up, forward] = [
+            Triple::splat(simd, right).dot(world),
+            Triple::splat(simd, up).dot(world),
+            Triple::splat(simd, forward).dot(world),
+        ];
         let zero = simd.splat(0.0);
-        let normal = Triple([right, up, zero - forward]);
+        let mut normal = Triple([right, up, zero - forward]);
         let away = normal.dot(to_eye).lt(zero);
-        Triple(normal.0.map(|axis| (zero - axis).select(away, axis)))
+        for axis in &mut normal.0 {
+            *axis = (zero - *axis).select(away, *axis);
+        }
+        normal
     }
 
     /// An image has one alpha for all channels, so that what is unknown is dimmed as a whole and its tint is a grey's.
@@ -225,29 +235,46 @@ impl RowTask<'_> {
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
         let [r, g, b] = shaded.transmittance.0;
         let dimmed = (r + g + b) * simd.splat(1.0 / 3.0);
-        let open = one - self.behind(simd, start, count, 3);
+        let behind = self.behind(simd, start, count);
+        let open = one - behind[3];
         let mut channels = [Lanes::splat(0.0); 4];
         for (axis, lanes) in channels.iter_mut().take(3).enumerate() {
             let passes = shaded.transmittance.0[axis];
             let tint = (passes - dimmed) * simd.splat(GREY_BEHIND) * open;
-            let through = passes.mul_add(self.behind(simd, start, count, axis), tint);
+            let through = passes.mul_add(behind[axis], tint);
             shaded.radiance.0[axis].mul_add(contrast, through).max(zero).store(lanes);
         }
         (one - dimmed * open).store(&mut channels[3]);
-        for lane in 0..count {
-            if self.material[start + lane] >= 0 {
-                self.rgba[start + lane] = [0, 1, 2, 3].map(|axis| channels[axis].0[lane]);
+        let mut pixels = [[0.0; 4]; LANES];
+        for (lane, pixel) in pixels.iter_mut().enumerate() {
+            *pixel = [0, 1, 2, 3].map(|axis| channels[axis].0[lane]);
+        }
+        let (material, rgba) = (&self.material[start..start + count], &mut self.rgba[start..start + count]);
+        if material.iter().all(|index| *index >= 0) {
+            return rgba.copy_from_slice(&pixels[..count]);
+        }
+        for ((target, index), pixel) in rgba.iter_mut().zip(material).zip(pixels) {
+            if *index >= 0 {
+                *target = pixel;
             }
         }
     }
 
+    /// The channels of what is behind.
     #[inline(always)]
-    fn behind<S: Simd>(&self, simd: S, start: usize, count: usize, channel: usize) -> S::Vector {
-        let mut lanes = Lanes::splat(0.0);
-        for (lane, pixel) in lanes.0.iter_mut().zip(&self.rgba[start..start + count]) {
-            *lane = pixel[channel];
+    fn behind<S: Simd>(&self, simd: S, start: usize, count: usize) -> [S::Vector; 4] {
+        let (mut pixels, mut channels) = ([[0.0; 4]; LANES], [Lanes::splat(0.0); 4]);
+        if let Some([r, g, b, a]) = self.behind {
+            return [simd.splat(r), simd.splat(g), simd.splat(b), simd.splat(a)];
         }
-        simd.load(&lanes)
+        pixels[..count].copy_from_slice(&self.rgba[start..start + count]);
+        for (lane, pixel) in pixels.iter().enumerate() {
+            for (channel, number) in channels.iter_mut().zip(pixel) {
+                channel.0[lane] = *number;
+            }
+        }
+        let [r, g, b, a] = &channels;
+        [simd.load(r), simd.load(g), simd.load(b), simd.load(a)]
     }
 }
 
@@ -271,11 +298,13 @@ impl Task for PointsTask<'_> {
             for (lane, index) in material.iter_mut().zip(&self.points.material[part.clone()]) {
                 *lane = usize::try_from(*index).unwrap_or(0);
             }
-            let [position, normal, to_eye, base] =
-                [self.points.position, self.points.normal, self.points.to_eye, self.points.color]
-                    .map(|all| material::triples(simd, &all[part.clone()]));
+            let position = material::triples(simd, &self.points.position[part.clone()]);
+            let normal = material::triples(simd, &self.points.normal[part.clone()]);
+            let to_eye = material::triples(simd, &self.points.to_eye[part.clone()]);
+            let base = material::triples(simd, &self.points.color[part]);
             let shaded = material::shade(simd, self.scene, &material, position, normal, to_eye, base);
-            let channels = shaded.radiance.0.map(Vector::lanes);
+            let [r, g, b] = shaded.radiance.0;
+            let channels = [r.lanes(), g.lanes(), b.lanes()];
             for (lane, point) in radiance.iter_mut().enumerate() {
                 *point = [0, 1, 2].map(|axis| channels[axis].0[lane]);
             }

@@ -106,7 +106,7 @@ fn images_are_laid_over_what_is_behind() {
             material: &material,
             contrast: &vec![0.5; width],
             rgba: &mut rgba,
-            is_over_nothing: false,
+            behind: None,
         };
         shade_image(path, &view(width), &scene, image, &Job::default()).unwrap();
         for (column, pixel) in rgba.iter().enumerate() {
@@ -125,21 +125,28 @@ fn images_are_laid_over_what_is_behind() {
 }
 
 #[test]
-fn over_nothing_what_was_there_does_not_count() {
-    let materials = [DULL];
-    let scene = Scene::new(&materials, &[], [0.5; 3]).unwrap();
-    let mut rgba = [[9.0; 4]; 2];
-    let image = Image {
-        depth: &[1.0; 2],
-        normal: &[[0.0, 0.0, -1.0]; 2],
-        color: &[[1.0; 3]; 2],
-        material: &[0, -1],
-        contrast: &[],
-        rgba: &mut rgba,
-        is_over_nothing: true,
-    };
-    shade_image(Path::Portable, &view(2), &scene, image, &Job::default()).unwrap();
-    assert_eq!(rgba, [[0.5, 0.5, 0.5, 1.0], [0.0; 4]]);
+fn over_one_color_what_was_there_does_not_count() {
+    let clear = Material { transmission: 1.0, ior: 1.0, ..DULL };
+    for (material, behind) in [(DULL, [0.0; 4]), (clear, [0.0, 0.5, 1.0, 1.0])] {
+        let materials = [material];
+        let scene = Scene::new(&materials, &[], [0.5; 3]).unwrap();
+        let laid = |mut rgba: [[f32; 4]; 2], behind| {
+            let image = Image {
+                depth: &[1.0; 2],
+                normal: &[[0.0, 0.0, -1.0]; 2],
+                color: &[[1.0; 3]; 2],
+                material: &[0, -1],
+                contrast: &[],
+                rgba: &mut rgba,
+                behind,
+            };
+            shade_image(Path::Portable, &view(2), &scene, image, &Job::default()).unwrap();
+            rgba
+        };
+        let over = laid([[9.0; 4]; 2], Some(behind));
+        assert_eq!(over, laid([behind; 2], None));
+        assert_eq!(over[1], behind);
+    }
 }
 
 #[test]

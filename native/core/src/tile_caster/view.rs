@@ -8,7 +8,7 @@ pub const MAX_SIDE: usize = u16::MAX as usize;
 /// A camera without a render region: to render a part of an image, crop its window.
 ///
 /// Camera space has x to the right, y up and the planar depth as third coordinate, in world units.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Rows: the camera's right, up and forward directions in world space, unit.
     pub camera_from_world: [[f64; 3]; 3],
