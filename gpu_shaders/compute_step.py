@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import moderngl
+
 from .context import GpuContext
 from .programs import ProgramSource
 
@@ -33,7 +35,7 @@ class ComputeStep:
         """Run that many groups, and maybe some more, in lines of at most MOST_GROUPS."""
         self.run(min(groups, MOST_GROUPS), max(1, -(-groups // MOST_GROUPS)))
 
-    def run_indirect(self, counts: object, offset: int) -> None:
+    def run_indirect(self, counts: moderngl.Buffer, offset: int) -> None:
         """Run as many groups as the three numbers in a buffer say, from `offset` bytes on."""
         self._shader.run_indirect(counts, offset)
         self._gl.memory_barrier()

@@ -36,7 +36,7 @@ class ProgramSource:
 
     @property
     def files(self) -> dict[str, str]:
-        """Paths by stage ("vertex", "geometry", "fragment", "compute"), in the order of the stages; only those that there are."""
+        """Paths by stage ("vertex", "geometry", "fragment", "compute"), in their order; only those that there are."""
         stages = {"vertex": self.vertex, "geometry": self.geometry, "fragment": self.fragment, "compute": self.compute}
         return {stage: path for stage, path in stages.items() if path is not None}
 

@@ -74,7 +74,7 @@ class SurfaceTextures:
         width, height = self.size
         self.textures["depth"].write(np.full((height, width), DEPTH_BACKGROUND, np.float32))
 
-    def read(self, name: str) -> npt.NDArray:
+    def read(self, name: str) -> npt.NDArray[np.float32]:
         """(height, width) depth or balls, else (height, width, 3)."""
         width, height = self.size
         texture = self.textures[name]

@@ -14,8 +14,8 @@ _PACKAGE = __package__.rpartition(".addon.")[0]
 
 # Folders with `params.py` (METHOD, loads nothing heavy) and `method.py` (create()); the preferred first.
 _FOLDERS = (
-    "addon.render.tile_caster",
     "gpu_shaders.methods.tile_lists",
+    "addon.render.tile_caster",
     "gpu_shaders.methods.depth_peeling",
 )
 

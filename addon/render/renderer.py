@@ -20,7 +20,7 @@ from .device_image import DeviceImage
 from .image_memory import ImageMemory
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
 from .pass_images import NEEDED, PassImages
-from .registry import create_method, method_infos
+from .registry import create_method, method_infos, runs_in_software_opengl
 from .surroundings import Backdrop, Motion
 
 Element = TypeVar("Element", np.float32, np.bool_, np.int32)
@@ -225,16 +225,28 @@ def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) ->
     if method != "auto":
         return _named_method(method, backend, attributes)
     problems: list[MeniscusError] = []
-    for info in method_infos():
-        if backend in ("auto", info.backend):
-            try:
-                if missing := _passes_without(attributes - info.attributes):
-                    raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
-                reason = str(problems[0]) if problems else "The fastest method, and it runs here"
-                return _Choice(*create_method(info.name), reason)
-            except (DeviceError, InputError) as error:
-                problems.append(error)
+    for info in _preferred(backend):
+        try:
+            if missing := _passes_without(attributes - info.attributes):
+                raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
+            reason = str(problems[0]) if problems else "The fastest method, and it runs here"
+            return _Choice(*create_method(info.name), reason)
+        except (DeviceError, InputError) as error:
+            problems.append(error)
     raise problems[0]
+
+
+def _preferred(backend: str) -> list[MethodInfo]:
+    """The methods on a back-end, the preferred first; without a choice those on OpenGL that is only software come last."""
+    infos = [info for info in method_infos() if backend in ("auto", info.backend)]
+    return sorted(infos, key=_runs_in_software) if backend == "auto" else infos
+
+
+def _runs_in_software(info: MethodInfo) -> bool:
+    try:
+        return runs_in_software_opengl(info)
+    except DeviceError:  # told when the method is tried
+        return False
 
 
 def _named_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 
 def _image(meniscus, method):
@@ -12,20 +13,25 @@ def _image(meniscus, method):
     return meniscus.render(balls, camera, meniscus.Field(), method=method, passes=("depth", "normal", "combined"))
 
 
-def test_depth_peeling_sees_what_the_exact_method_sees(meniscus):
-    peeled, exact = _image(meniscus, "depth_peeling"), _image(meniscus, "tile_caster")
+GPU_METHODS = ("tile_lists", "depth_peeling")
+
+
+@pytest.mark.parametrize("method", GPU_METHODS)
+def test_methods_on_opengl_see_what_the_cpu_sees(meniscus, method):
+    found, exact = _image(meniscus, method), _image(meniscus, "tile_caster")
     assert 0.1 < exact.hit.mean() < 0.9
-    np.testing.assert_array_equal(peeled.hit, exact.hit)
+    np.testing.assert_array_equal(found.hit, exact.hit)
     for name in ("depth", "normal", "combined"):
-        np.testing.assert_allclose(peeled[name], exact[name], atol=2e-4)
+        np.testing.assert_allclose(found[name], exact[name], atol=2e-4)
 
 
-def test_rendering_again_and_again_gives_the_same(meniscus):
-    first = _image(meniscus, "depth_peeling")
+@pytest.mark.parametrize("method", GPU_METHODS)
+def test_rendering_again_and_again_gives_the_same(meniscus, method):
+    first = _image(meniscus, method)
     for _ in range(5):
-        np.testing.assert_array_equal(_image(meniscus, "depth_peeling")["depth"], first["depth"])
+        np.testing.assert_array_equal(_image(meniscus, method)["depth"], first["depth"])
 
 
 def test_every_method_says_whether_it_runs_here(meniscus):
     problems = {status.name: status.problem for status in meniscus.methods()}
-    assert problems == {"depth_peeling": "", "tile_caster": ""}
+    assert problems == {"tile_lists": "", "tile_caster": "", "depth_peeling": ""}

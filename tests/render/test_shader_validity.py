@@ -23,14 +23,20 @@ def checked_programs():
 def compiled_programs(another_context, monkeypatch):
     """Collects the texts by stage of all programs that a fresh context compiles."""
     compiled = []
-    compile_program = another_context.gl.program
+    gl = another_context.gl
+    compile_program, compile_compute = gl.program, gl.compute_shader
 
     def record(**arguments):
         texts = {name.removesuffix("_shader"): text for name, text in arguments.items() if name.endswith("_shader")}
         compiled.append({stage: text.strip() for stage, text in texts.items() if text})
         return compile_program(**arguments)
 
-    monkeypatch.setattr(another_context.gl, "program", record)
+    def record_compute(source):
+        compiled.append({"compute": source.strip()})
+        return compile_compute(source)
+
+    monkeypatch.setattr(gl, "program", record)
+    monkeypatch.setattr(gl, "compute_shader", record_compute)
     return compiled
 
 

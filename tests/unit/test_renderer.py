@@ -94,7 +94,7 @@ def test_cancelling_stops_the_render():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, tile_caster, depth_peeling"),
+        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, tile_lists, tile_caster, depth_peeling"),
         ({"backend": "tpu"}, "Unknown back-end 'tpu'"),
         ({"method": "depth_peeling", "backend": "cpu"}, "runs on the back-end 'gpu', not on 'cpu'"),
         ({"passes": ("dpeth",)}, "Unknown pass 'dpeth'"),
@@ -111,11 +111,15 @@ def no_opengl(monkeypatch):
         raise DeviceError("OpenGL 3.3 is not available here")
 
     monkeypatch.setattr(registry.gpu(), "shared_context", fail)
-    method = registry._import("gpu_shaders.methods.depth_peeling", "method")
-    monkeypatch.setattr(method, "create", fail)
+    for name in ("tile_lists", "depth_peeling"):
+        monkeypatch.setattr(registry._import(f"gpu_shaders.methods.{name}", "method"), "create", fail)
 
 
-def test_the_fastest_method_is_taken_and_says_why():
+def test_the_fastest_method_is_taken_and_says_why(monkeypatch):
+    opengl = registry.gpu().shared_context()
+    monkeypatch.setattr(opengl, "renderer", "A fast graphics processor")
+    assert render(backend="auto").info.method == "tile_lists"
+    monkeypatch.setattr(opengl, "renderer", "llvmpipe")
     assert render(backend="auto").info.method == "tile_caster"
     assert "fastest" in render(backend="auto").info.reason
     assert render(backend="auto", method="tile_caster").info.reason == "Chosen in the settings"
@@ -131,7 +135,7 @@ def test_where_the_fastest_method_cannot_run_the_next_one_does_and_says_why(monk
 
     monkeypatch.setattr(renderer, "create_method", fail)
     info = render(backend="auto", passes=("depth", "normal")).info
-    assert (info.method, info.reason) == ("depth_peeling", "The native module is missing")
+    assert (info.method, info.reason) == ("tile_lists", "The native module is missing")
 
 
 def test_without_opengl_the_cpu_does_the_work(no_opengl):
@@ -142,6 +146,7 @@ def test_without_opengl_the_gpu_says_why_not(no_opengl):
     with pytest.raises(DeviceError, match="not available here"):
         render(backend="gpu")
     problems = {status.name: status.problem for status in meniscus.methods()}
+    assert "not available" in problems["tile_lists"]
     assert "not available" in problems["depth_peeling"]
     assert not problems["tile_caster"]
 
@@ -213,4 +218,4 @@ def test_a_missing_package_of_opengl_is_one_sentence(monkeypatch):
     monkeypatch.setattr(registry.importlib, "import_module", import_module)
     with pytest.raises(DeviceError, match=r"a package is missing \(No module named 'moderngl'\); reinstall the extension"):
         render(backend="auto", method="depth_peeling")
-    assert [bool(status.problem) for status in meniscus.methods()] == [False, True]
+    assert [bool(status.problem) for status in meniscus.methods()] == [True, False, True]

@@ -2,7 +2,7 @@
 
 In a frame, each step a compute shader:
 
-- `occlude` draws kernel spheres (Kanamori et al. 2008, section 5.2) into cells of 4 x 4 pixels, those of a sample first, so that
+- `occlude` draws kernel spheres (Kanamori et al. 2008, section 5.2) into cells of 4 x 4 pixels, some of them first, so that
   most others turn out to be hidden; `occlude_large` those that cover many cells. `pyramid` makes a pyramid over the cells.
 - `cull` keeps the balls that may be seen and counts them in their tiles; `scan` says where each tile's list begins; `fill` puts
   the balls there, `sort_short` and `sort_long` bring each list into the order in which the balls begin.

@@ -40,7 +40,7 @@ struct Stream {
 };
 
 Stream streams[TILE_LEVELS];
-float visible_end; // what begins behind this is hidden
+float visible_end = FAR; // what begins behind this is hidden
 
 float front_of(Stream stream) {
     if (stream.next >= stream.end)

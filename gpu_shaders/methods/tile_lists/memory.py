@@ -55,19 +55,19 @@ class Grid:
     @property
     def tile_count(self) -> int:
         """On all levels."""
-        return self.tile_starts[-1]
+        return int(self.tile_starts[-1])
 
     def block(self) -> npt.NDArray[np.int32]:
         """The uniform block Grid of occlusion.glsl."""
         block = np.zeros((1 + OCCLUSION_LEVELS, 4), np.int32)
-        block[0] = *self.cells, self.levels, self.tile_count
+        block[0, :3] = *self.cells, self.levels
         block[1 : 1 + self.levels, 0] = self.level_starts[:-1]
         block[1 : 1 + TILE_LEVELS, 1] = self.tile_starts[:-1]
         return block
 
 
 def _cells_of_level(cells: tuple[int, int], level: int) -> int:
-    return -(-cells[0] // 2**level) * -(-cells[1] // 2**level)
+    return -(-cells[0] // (1 << level)) * -(-cells[1] // (1 << level))
 
 
 class Memory:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 import moderngl
 import numpy as np
 
 from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.field import Field
+from ....addon.fluid.kernels import KERNELS, Kernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import Attribute, Request, Surface, timed
 from ...camera_parts import camera_uniforms, image_parts
@@ -59,6 +61,8 @@ class TileLists:
         self._steps: dict[Variant, dict[str, ComputeStep]] = {}
         self._balls: BallBuffers | None = None
         self._memory: dict[tuple[int, int], Memory] = {}
+        # A driver that rejects the shaders is to be known before the method is chosen.
+        context.run(lambda: self._steps_of(self._variant(KERNELS["wyvill"])))
 
     @property
     def device(self) -> str:
@@ -78,12 +82,13 @@ class TileLists:
             with timed(surface.milliseconds, "surface"):
                 for region in self._parts(request.camera):
                     request.watch(region.y_min / request.camera.height)
-                    self._context.run(lambda region=region: self._find_part(request, attributes, region, surface))
+                    self._context.run(partial(self._find_part, request, attributes, region, surface))
         return surface
 
     def find_surface_on_device(self, request: Request) -> SurfaceTextures:
         """See :meth:`method.DeviceMethod.find_surface_on_device`."""
-        camera, milliseconds = request.camera, {}
+        camera = request.camera
+        milliseconds: dict[str, float] = {}
         self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
         request.watch(0.0)
         with timed(milliseconds, "surface"):
@@ -125,14 +130,16 @@ class TileLists:
         size = camera.width, camera.height
         if size not in self._memory:
             self._memory = {size: Memory(self._storage, *size)}
-        variant = Variant(
-            request.field.density_kernel, self._balls.weight is None, wanted, self._list_length, self._short_list
-        )
+        steps = self._steps_of(self._variant(request.field.density_kernel, self._balls.weight is None, wanted))
+        return _Frame(self._context, steps, self._balls, self._memory[size], camera, request.field)
+
+    def _variant(self, kernel: Kernel, with_weights: bool = False, attributes: frozenset[Attribute] = frozenset()) -> Variant:
+        return Variant(kernel, with_weights, attributes, self._list_length, self._short_list)
+
+    def _steps_of(self, variant: Variant) -> dict[str, ComputeStep]:
         if variant not in self._steps:
-            self._steps[variant] = {
-                name: ComputeStep(self._context, program) for name, program in variant.programs().items()
-            }
-        return _Frame(self._context, self._steps[variant], self._balls, self._memory[size], camera, request.field)
+            self._steps[variant] = {name: ComputeStep(self._context, program) for name, program in variant.programs().items()}
+        return self._steps[variant]
 
 
 class _Frame:
@@ -258,6 +265,10 @@ def _wanted(request: Request) -> tuple[Attribute, ...]:
 def _background(camera: Camera, attributes: tuple[Attribute, ...]) -> Surface:
     """The surface of nothing, to be filled."""
     shape = camera.height, camera.width
-    vectors = {name: np.zeros((*shape, 3), np.float32) for name in ("color", "velocity") if name in attributes}
+    normal, color, velocity = (
+        np.zeros((*shape, 3), np.float32) if name in ("normal", *attributes) else None
+        for name in ("normal", "color", "velocity")
+    )
+    assert normal is not None
     ball = np.full(shape, -1, np.int32) if "ball" in attributes else None
-    return Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32), **vectors, ball=ball)
+    return Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), normal, color, velocity, ball)

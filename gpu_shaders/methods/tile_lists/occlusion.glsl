@@ -9,7 +9,6 @@ layout(std430, binding = 3) buffer Occlusion {
 layout(std140, binding = 0) uniform Grid {
     ivec2 cells; // across and up, of the finest level
     int level_count;
-    int tile_count;                       // on all levels
     ivec4 level_starts[OCCLUSION_LEVELS]; // where each level lies, in x; where each level of tiles lies, in y
 };
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 from ....addon.fluid.kernels import KERNELS, Kernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
@@ -96,9 +96,11 @@ class Variant:
 
 def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
-    everything: frozenset[Attribute] = frozenset({"color", "velocity", "ball"})
-    for kernel, flag, attributes in product(KERNELS.values(), (False, True), (frozenset(), everything)):
+    names: tuple[Attribute, ...] = ("color", "velocity", "ball")
+    subsets = [frozenset(chosen) for count in range(4) for chosen in combinations(names, count)]
+    for kernel, flag, attributes in product(KERNELS.values(), (False, True), subsets):
         yield from Variant(kernel, flag, attributes).programs().values()
+    yield from Variant(KERNELS["wyvill"], short_list=SOFTWARE_SHORT_LIST).programs().values()
 
 
 def _program(name: str, **constants: object) -> ProgramSource:
