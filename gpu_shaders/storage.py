@@ -27,6 +27,10 @@ class Storage:
         self._bind = context.function("glBindBuffer", unsigned, unsigned)
         self._clear = context.function("glClearBufferData", *[unsigned] * 4, ctypes.c_void_p)
 
+    def most(self, size: int) -> int:
+        """How many things of so many bytes a buffer takes."""
+        return self._context.limits.storage_block_bytes // size
+
     def reserve(self, size: int) -> moderngl.Buffer:
         """A buffer of so many bytes; DeviceError where it is more than a shader can use."""
         limit = self._context.limits.storage_block_bytes

@@ -23,6 +23,9 @@ _FORMATS: dict[str, tuple[int, str]] = {
 }
 """Channels and their type."""
 
+_BACKGROUNDS = {"depth": DEPTH_BACKGROUND, "ball": -1}
+"""Where there is nothing; 0 for vectors."""
+
 _GL_TEXTURE_2D = 0x0DE1
 _GL_DRAW_FRAMEBUFFER = 0x8CA9
 _GL_COLOR_ATTACHMENT0 = 0x8CE0
@@ -67,12 +70,18 @@ class SurfaceTextures:
         """See :meth:`method.DeviceSurface.passes`."""
         return tuple(self.textures)
 
+    def add_report(self, milliseconds: dict[str, float], counts: dict[str, int]) -> None:
+        """Add times and counts to those that are there."""
+        for numbers, more in ((self.milliseconds, milliseconds), (self.counts, counts)):
+            numbers |= {name: numbers.get(name, 0) + number for name, number in more.items()}
+
     def clear(self) -> None:
-        """Make it the surface of nothing."""
-        assert self.framebuffer is not None
-        self.framebuffer.clear()
+        """Make it the surface of nothing, of which nothing is reported."""
         width, height = self.size
-        self.textures["depth"].write(np.full((height, width), DEPTH_BACKGROUND, np.float32))
+        self.milliseconds, self.counts = {}, {}
+        for name, texture in self.textures.items():
+            nothing = _BACKGROUNDS.get(name, 0)
+            texture.write(np.full((height, width, texture.components), nothing, texture.dtype))
 
     def read(self, name: str) -> npt.NDArray[np.float32]:
         """(height, width) depth or balls, else (height, width, 3)."""

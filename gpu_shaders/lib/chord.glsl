@@ -21,11 +21,12 @@ vec2 ball_offset(Ball ball, Ray ray) {
 Chord ball_chord(Ball ball, Ray ray) {
     vec2 offset = ball_offset(ball, ray);
     float along = dot(offset, ray.slope);
-    float turn = offset.x * ray.slope.y - offset.y * ray.slope.x;
+    // In radii: their squares may be more than floats hold.
+    vec2 apart = offset / (ball.radius * ray.stretch);
+    float turn = apart.x * ray.slope.y - apart.y * ray.slope.x;
     // |offset x direction|^2 / |direction|^2: nothing cancels.
-    float distance_2 = (dot(offset, offset) + turn * turn) / (ray.stretch * ray.stretch);
-    float radius_2 = ball.radius * ball.radius;
-    return Chord((radius_2 - distance_2) / radius_2, along / ray.stretch - ball.center.z * ray.stretch, ball.radius);
+    float distance_2 = dot(apart, apart) + turn * turn;
+    return Chord(1.0 - distance_2, along / ray.stretch - ball.center.z * ray.stretch, ball.radius);
 }
 
 float chord_half_length(Chord chord) {

@@ -22,6 +22,12 @@ _COUNTS = 32
 """Balls of which it is known what the best of them must give."""
 
 
+POSITION_BYTES = 12
+"""Of a ball, in the largest of its buffers."""
+
+_BINDINGS: dict[Attribute, int] = {"color": 13, "velocity": 14, "ball": 15}
+
+
 @dataclass(frozen=True)
 class BallBuffers:
     """Balls as the shaders read them: 16 bytes for each, more where weights differ or attributes are wanted.
@@ -41,23 +47,32 @@ class BallBuffers:
     weight: float | None
 
     @classmethod
-    def upload(cls, storage: Storage, balls: Balls, attributes: frozenset[Attribute]) -> BallBuffers:
-        """Upload what is needed to find the attributes."""
+    def upload(
+        cls,
+        storage: Storage,
+        balls: Balls,
+        attributes: frozenset[Attribute],
+        indices: npt.NDArray[np.int64] | None,
+    ) -> BallBuffers:
+        """Upload what is needed to find the attributes; `indices` are the balls' numbers where they are only some."""
         weight = float(balls.weights[0])
         is_same = bool(np.all(balls.weights == balls.weights[0]))
-        arrays: dict[int, npt.NDArray[np.float32] | None] = {
+        arrays: dict[int, npt.NDArray[np.float32] | npt.NDArray[np.int32] | None] = {
             0: balls.positions,
             1: balls.radii,
             2: None if is_same else balls.weights,
             13: balls.colors if "color" in attributes else None,
             14: balls.velocities if "velocity" in attributes else None,
         }
+        if "ball" in attributes:
+            numbers = np.arange(len(balls)) if indices is None else indices
+            arrays[15] = numbers.astype(np.int32)
         buffers = {binding: storage.of(array) for binding, array in arrays.items() if array is not None}
         return cls(balls, buffers, weight if is_same else None)
 
     def has(self, attributes: frozenset[Attribute]) -> bool:
         """Whether what the attributes need was uploaded."""
-        return ("color" not in attributes or 13 in self.buffers) and ("velocity" not in attributes or 14 in self.buffers)
+        return all(_BINDINGS[name] in self.buffers for name in attributes)
 
 
 def kernel_shares(field: Field) -> npt.NDArray[np.float32]:

@@ -3,8 +3,8 @@
 
 layout(local_size_x = 64) in;
 
-layout(r32f, binding = 0) writeonly uniform image2D depth_image;
-layout(rgba32f, binding = 1) writeonly uniform image2D normal_image;
+layout(r32f, binding = 0) uniform image2D depth_image;
+layout(rgba32f, binding = 1) uniform image2D normal_image; // w: -1 where a ray that goes on is inside the fluid
 #if WITH_COLORS
 layout(rgba32f, binding = 2) writeonly uniform image2D color_image;
 layout(std430, binding = 13) readonly buffer Colors {
@@ -19,10 +19,15 @@ layout(std430, binding = 14) readonly buffer Velocities {
 #endif
 #if WITH_BALLS
 layout(r32i, binding = 4) writeonly uniform iimage2D ball_image;
+layout(std430, binding = 15) readonly buffer Numbers {
+    int numbers[];
+};
 #endif
 
 uniform ivec2 image_size;
 uniform vec2 clip_distances; // planar
+uniform vec2 slab;           // rays are searched between these distances
+uniform bool goes_on;        // and were before
 uniform mat3 world_from_view;
 
 // What the balls give at the surface.
@@ -59,7 +64,9 @@ void add_shade(inout Shade shade, Ray ray, vec3 direction, uint place, float t) 
     shade.total += share;
     if (share > shade.greatest) {
         shade.greatest = share;
-        shade.ball = int(id);
+#if WITH_BALLS
+        shade.ball = numbers[id];
+#endif
     }
 }
 
@@ -88,7 +95,7 @@ bool cast_ray(Ray ray, inout float t, float end, out bool is_crowded) {
         crowd_starts[level] = streams[level].next;
     take_in(ray, t, 0u);
     float density = next_front() < t ? crowd_at(ray, t, 0.0).density : density_at(t).x;
-    if (density > isovalue)
+    if (!goes_on && density > isovalue)
         side = -1.0;
     drop_before(t);
     for (uint i = 0u; i < MOST_WINDOWS && t < end; i++) {
@@ -122,7 +129,7 @@ bool cast_ray(Ray ray, inout float t, float end, out bool is_crowded) {
 void put(ivec2 pixel, float depth, vec3 normal, Shade shade) {
     float share = shade.total > 0.0 ? 1.0 / shade.total : 0.0;
     imageStore(depth_image, pixel, vec4(depth));
-    imageStore(normal_image, pixel, vec4(normal, 0.0));
+    imageStore(normal_image, pixel, vec4(normal, side));
 #if WITH_COLORS
     imageStore(color_image, pixel, vec4(shade.color * share, 0.0));
 #endif
@@ -140,14 +147,19 @@ void main() {
     ivec2 pixel = ivec2(gl_WorkGroupID.xy) * 8 + inside;
     if (any(greaterThanEqual(pixel, image_size)))
         return;
+    if (goes_on) {
+        if (imageLoad(depth_image, pixel).x < DEPTH_BACKGROUND)
+            return;
+        side = imageLoad(normal_image, pixel).w;
+    }
     Ray ray = ray_from_pixel(vec2(pixel) + 0.5);
     vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
     visible_end = uintBitsToFloat(occlusion[occlusion_index(0, pixel / CELL_SIZE)]);
     open_streams(pixel);
-    float t = clip_distances.x * ray.stretch;
+    float t = max(clip_distances.x * ray.stretch, slab.x), end = min(clip_distances.y * ray.stretch, slab.y);
     bool is_crowded = false;
     Shade shade = Shade(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, -1);
-    if (!cast_ray(ray, t, clip_distances.y * ray.stretch, is_crowded)) {
+    if (!cast_ray(ray, t, end, is_crowded)) {
         put(pixel, DEPTH_BACKGROUND, vec3(0.0), shade);
     } else {
         shade = shade_at(ray, direction, t, is_crowded);

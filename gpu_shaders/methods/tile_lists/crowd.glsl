@@ -26,7 +26,7 @@ void add_to_crowd(inout Crowd crowd, Chord chord, float weight, float t, float w
     float x = chord.peak - offset * offset;
     float slope = weight * kernel_derivative(x) * -2.0 * offset / chord.radius;
     crowd.density += weight * kernel_value(x);
-    crowd.bend += abs(weight) * kernel_slope_change(chord.peak) / (chord.radius * chord.radius);
+    crowd.bend += abs(weight) * kernel_slope_change(chord.peak) / chord.radius / chord.radius;
 #if KERNEL_POWER == 1
     // The slope jumps up where the ray enters a ball, and where it leaves one from a slope downwards.
     if (x <= 0.0)

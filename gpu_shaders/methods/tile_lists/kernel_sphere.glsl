@@ -14,6 +14,7 @@ layout(std430, binding = 5) buffer OpenCells {
 
 uniform float isovalue;
 uniform vec2 clip_distances; // planar
+uniform vec2 slab;           // rays are searched between these distances
 
 // What a ball does to the cells from `first` to before `end`: its kernel sphere hides what is behind, or it opens them, because
 // it carves or a ray may start in the fluid.
@@ -64,7 +65,8 @@ Occluder hider(Ball ball, float weight) {
 Occluder occluder_of(uint id) {
     Ball ball = ball_in_view(id);
     float weight = ball_weight(id);
-    bool opens = weight < 0.0 || -ball.center.z - ball.radius <= clip_distances.x * (1.0 + DISTANCE_ERROR);
+    bool opens = weight < 0.0 || -ball.center.z - ball.radius <= clip_distances.x * (1.0 + DISTANCE_ERROR) ||
+                 sphere_nearest(ball.center, ball.radius) <= slab.x;
     // A ball that begins before the clip distance may still hide what is behind it elsewhere, but not where it is.
     if (opens)
         return opener(ball);

@@ -109,7 +109,7 @@ float half_chord(Listed ball) {
 }
 
 void add_bounds(Listed ball) {
-    float pull = abs(ball.weight) / (ball.radius * ball.radius);
+    float pull = abs(ball.weight) / ball.radius / ball.radius;
     float up = pull * kernel_steepest_rise(ball.peak), down = pull * kernel_steepest_fall(ball.peak);
     bounds.density += max(ball.weight, 0.0) * kernel_value(ball.peak);
     bounds.rise += ball.weight < 0.0 ? down : up;

@@ -16,6 +16,8 @@ SEEN_BYTES = 32
 ENTRY_BYTES = 8
 COUNT_BYTES = 48
 FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET = 16, 32
+_ROOM = 1.25
+"""How much larger than needed buffers become, so that the next frame fits as well."""
 _LEAST_SEEN = 1 << 14
 _LEAST_ENTRIES = 1 << 16
 
@@ -93,14 +95,38 @@ class Memory:
             10: storage.reserve(4 * (grid.tile_count + 1)),
         }
         self._grid_block = storage.of(grid.block())
-        self.grow(_LEAST_SEEN, _LEAST_ENTRIES)
+        self._reserve(min(_LEAST_SEEN, storage.most(SEEN_BYTES)), min(_LEAST_ENTRIES, storage.most(ENTRY_BYTES)))
 
-    def grow(self, seen: int, entries: int) -> None:
-        """Make room for seen balls, and for entries of lists."""
+    def holds(self, seen: int, entries: int) -> bool:
+        """Whether there was room for seen balls, and for entries of lists."""
+        return seen <= self.seen_capacity and entries <= self.entry_capacity
+
+    def grow(self, seen: int, entries: int) -> bool:
+        """Make room for them, and for some more; False where a shader cannot use so much."""
+        most_seen, most_entries = self.storage.most(SEEN_BYTES), self.storage.most(ENTRY_BYTES)
+        if seen > most_seen or entries > most_entries:
+            return False
+        self._reserve(
+            min(max(int(_ROOM * seen), self.seen_capacity), most_seen),
+            min(max(int(_ROOM * entries), self.entry_capacity), most_entries),
+        )
+        return True
+
+    def _reserve(self, seen: int, entries: int) -> None:
         self.seen_capacity, self.entry_capacity = seen, entries
+        self._known = (0, 0)
         for binding, size in ((8, SEEN_BYTES * seen), (11, ENTRY_BYTES * entries)):
             self._buffers.pop(binding, None)
             self._buffers[binding] = self.storage.reserve(size)
+
+    def know(self, seen: int, balls: int) -> None:
+        """Note how many of how many balls the buffer of seen balls has."""
+        self._known = (seen, balls)
+
+    def known_among(self, balls: int) -> int:
+        """How many balls of the frame before may still be seen; 0 where it had others."""
+        seen, before = self._known
+        return seen if before == balls else 0
 
     @property
     def counts(self) -> moderngl.Buffer:

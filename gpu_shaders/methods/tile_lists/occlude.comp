@@ -2,24 +2,31 @@
 // cells are the same in any order: each has the least distance of all spheres.
 #include "methods/tile_lists/kernel_sphere.glsl"
 #include "methods/tile_lists/large.glsl"
+#include "methods/tile_lists/seen.glsl"
 
 layout(local_size_x = THREADS) in;
 
-uniform uint step_size;  // one of so many balls is drawn
-uniform bool is_sampled; // nothing is known yet
+layout(std430, binding = 8) readonly buffer SeenBalls {
+    Seen seen[]; // in the frame before
+};
+
+uniform bool is_first;    // some balls are drawn, while nothing is known yet
+uniform uint drawn_count; // so many
+uniform uint step_size;   // one of so many balls is drawn; 0: those that were seen in the frame before
 
 const int FEW_CELLS = 64;
 
 // Whether others hide the sphere in all of its cells, so that drawing changes nothing.
 bool is_hidden(Occluder occluder) {
-    return !is_sampled && !occluder.opens &&
+    return !is_first && !occluder.opens &&
            occluder.distance - occluder.radius >= occlusion_farthest(occluder.first, occluder.end - 1);
 }
 
 void main() {
-    uint id = thread_number() * step_size;
-    if (id >= ball_count)
+    uint number = thread_number();
+    if (number >= drawn_count)
         return;
+    uint id = step_size == 0u ? min(seen[number].id, ball_count - 1u) : number * step_size;
     Occluder occluder = occluder_of(id);
     int cell_count = occluder_cells(occluder);
     if (cell_count == 0 || is_hidden(occluder))

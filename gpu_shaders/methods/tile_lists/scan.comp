@@ -13,6 +13,8 @@ layout(std430, binding = 10) writeonly buffer TileStarts {
 uniform uint list_count;
 uniform uint seen_capacity;
 
+const uint MOST_ENTRIES = 0x7fffffffu; // more than fit anywhere
+
 shared uint sums[1024];
 
 void main() {
@@ -22,7 +24,7 @@ void main() {
     uint sum = 0u, longest = 0u;
     for (uint i = 0u; i < part_count; i++) {
         uint count = first + i < list_count ? tile_counts[first + i] : 0u;
-        sum += count;
+        sum = min(sum + min(count, MOST_ENTRIES), MOST_ENTRIES);
         longest = max(longest, count);
     }
     sums[own] = sum;
@@ -32,7 +34,7 @@ void main() {
         uint before = own >= 1u << step ? sums[own - (1u << step)] : 0u;
         memoryBarrierShared();
         barrier();
-        sums[own] += before;
+        sums[own] = min(sums[own] + before, MOST_ENTRIES);
     }
     uint start = sums[own] - sum;
     for (uint i = 0u; i < part_count; i++) {

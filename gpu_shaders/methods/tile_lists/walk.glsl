@@ -70,7 +70,7 @@ vec2 kinks_ahead(float t) {
             kinks.x = min(kinks.x, entry - margin);
         if (t <= exit + margin)
             kinks.x = min(kinks.x, exit - margin);
-        float pull = ball.weight * side * KERNEL_LOW * 2.0 / (ball.radius * ball.radius);
+        float pull = ball.weight * side * KERNEL_LOW * 2.0 / ball.radius / ball.radius;
         bool is_before = t <= entry + margin || pull < 0.0;
         if (t <= exit + margin)
             kinks.y += is_before ? abs(pull) * half_length : max(pull * (ball.middle - t), 0.0);
