@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bench.scenes import SCENES as BENCH_SCENES
 from judge import judge
 from scenes import SCENES, Scene
 
@@ -111,6 +112,19 @@ def test_what_the_balls_carry_is_that_of_the_cpu():
     np.testing.assert_allclose(found["color"][same], wanted["color"][same], atol=1e-3)
     np.testing.assert_allclose(found["velocity"][same], wanted["velocity"][same], atol=1e-2)
     assert np.mean(found["ball_id"][same] == wanted["ball_id"][same]) > 0.998
+
+
+@pytest.mark.parametrize("name", ["random_10k", "random_100k", "dense_120k", "argon", "block_10k"])
+def test_pictures_of_the_samples_are_those_of_the_cpu(name):
+    scene = BENCH_SCENES[name]
+    balls = scene.make_balls()
+    camera = scene.camera(balls, 320, 240)
+    found, wanted = (
+        meniscus.render(balls, camera, scene.field, method=method, passes=("combined",))["combined"]
+        for method in ("tile_lists", "tile_caster")
+    )
+    assert np.mean(wanted[..., 3] > 0) > 0.1
+    assert np.mean(np.abs(found - wanted).max(axis=2) > 2 / 255) <= 0.0005
 
 
 def test_buffers_grow_until_everything_fits(monkeypatch, use):

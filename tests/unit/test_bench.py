@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from bench import accuracy, fitted_bvh, machine, options, report, run_bench, run_peers, timing
+from bench import accuracy, fitted_bvh, machine, options, report, run_bench, run_peers, scaling, timing
 from bench.judge import Judge, Judgement
 from bench.peers import cases
 from bench.renderers import Picture
@@ -470,3 +470,21 @@ def test_trees_have_rays_a_second_and_core_only_where_rays_are_cast():
     assert build[3:] == ["500 [499, 501]", "", ""]
     assert cast[3:] == ["250 [249, 251]", "1000000", "2"]
     assert failed[3:] == ["was killed", "", ""]
+
+
+def test_the_study_of_scaling_leaves_out_what_was_too_slow(monkeypatch):
+    spent = {"tile_lists": 1.0, "depth_peeling": 900.0}
+    monkeypatch.setattr(
+        scaling,
+        "measure",
+        lambda case, balls, method: {
+            "axis": case.axis, "value": scaling.value_of(case), "method": method, "milliseconds": spent[method],
+        },
+    )  # fmt: skip
+    study = [case for case in scaling.cases(10_000, (64, 48)) if case.axis == "balls"]
+    rows = scaling.measured(study, list(spent), limit=0.5)
+    assert [(row["value"], row["method"]) for row in rows] == [
+        ("1,000", "tile_lists"), ("1,000", "depth_peeling"), ("10,000", "tile_lists"),
+    ]  # fmt: skip
+    assert "900" in scaling.time_table(rows, list(spent)).splitlines()[2]
+    assert scaling.time_table(rows, list(spent)).splitlines()[3].split("|")[-2].strip() == ""
