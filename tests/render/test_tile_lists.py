@@ -137,6 +137,22 @@ def test_buffers_grow_until_everything_fits(monkeypatch, use):
     assert_equal(image_of(scene, camera), whole)
 
 
+def test_after_an_error_the_next_image_is_right(monkeypatch, opengl, use):
+    """As where the driver has no memory: it notes that, and what was made is of no use."""
+    scene = SCENES["random_5000"]()
+    camera = scene.camera("perspective")
+    whole = image_of(scene, camera)
+    use()
+    driver_errors = opengl._driver.errors
+    monkeypatch.setattr(opengl._driver, "errors", lambda: ["GL_OUT_OF_MEMORY"])
+    with pytest.raises(DeviceError, match="GL_OUT_OF_MEMORY"):
+        image_of(scene, camera)
+    monkeypatch.setattr(opengl._driver, "errors", driver_errors)
+    made = method.create()
+    assert made._balls is None
+    assert_equal(image_of(scene, camera), whole)
+
+
 def test_lists_of_any_length_are_sorted_alike(monkeypatch, use):
     """Lists of a few, some hundred and some thousand entries, sorted by single threads and by groups."""
     random = np.random.default_rng(5)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
+from ....addon.fluid.errors import MeniscusError
 from ....addon.fluid.kernels import KERNELS, Kernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import Attribute, Request, Surface, timed
@@ -24,6 +26,8 @@ from .memory import Memory
 from .params import METHOD
 from .programs import LIST_LENGTH, SHORT_LIST, SOFTWARE_SHORT_LIST, Variant
 from .slabs import FAR, Slab, slabs
+
+Result = TypeVar("Result")
 
 _STORAGE_BLOCKS = 16
 """Binding points that are used."""
@@ -76,7 +80,7 @@ class TileLists:
             with timed(surface.milliseconds, "surface"):
                 for region in self._parts(request.camera):
                     request.watch(region.y_min / request.camera.height)
-                    self._context.run(partial(self._find_part, request, attributes, region, surface))
+                    self._run(partial(self._find_part, request, attributes, region, surface))
         return surface
 
     def find_surface_on_device(self, request: Request) -> SurfaceTextures:
@@ -86,9 +90,17 @@ class TileLists:
         self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
         request.watch(0.0)
         with timed(milliseconds, "surface"):
-            textures = self._context.run(lambda: self._find_on_device(request))
+            textures = self._run(lambda: self._find_on_device(request))
         textures.milliseconds |= milliseconds
         return textures
+
+    def _run(self, work: Callable[[], Result]) -> Result:
+        """Do `work` on the context's thread; after an error nothing is kept, as the driver may have refused the memory."""
+        try:
+            return self._context.run(work)
+        except MeniscusError:
+            self._balls, self._memory = None, {}
+            raise
 
     def _parts(self, camera: Camera) -> Iterator[Region]:
         return image_parts(camera, _PIXELS_A_PART, self._context.limits.texture_size)
