@@ -32,6 +32,8 @@ class BallPart:
         (N,) int32; None where unknown.
     source
         Index of the object.
+    world_from_object
+        (4, 4) float64: the object's place, where `velocities` do not know of the motion of that; None where they do.
     """
 
     positions: FloatArray
@@ -41,6 +43,7 @@ class BallPart:
     velocities: FloatArray | None
     ids: npt.NDArray[np.int32] | None
     source: int = 0
+    world_from_object: npt.NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.positions)

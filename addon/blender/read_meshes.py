@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.lighting import Material
-from ..fluid.meshes import Meshes, MeshObject
+from ..fluid.meshes import Meshes, MeshObject, MeshPart
 from ..fluid.turning import turned
 from .read_materials import read_material
 from .read_particles import has_particle_systems
@@ -98,6 +98,22 @@ def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Objec
     return bool(settings.use_fluid) and fluid_replaces_surface(item, settings)
 
 
+def may_move(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Whether an object, or the surface that it has, may be elsewhere in other frames; as Cycles decides it.
+
+    Parameters
+    ----------
+    item
+        Evaluated.
+    scene
+        The original scene.
+    """
+    has_animation = item.animation_data or item.constraints or item.rigid_body or item.particle_systems
+    if has_animation or getattr(item.data, "animation_data", None) or item.is_deform_modified(scene, "RENDER"):
+        return True
+    return item.parent is not None and may_move(item.parent, scene)
+
+
 def fluid_replaces_surface(item: bpy.types.Object, settings: bpy.types.PropertyGroup) -> bool:
     """Whether the fluid of a source, with the given ``meniscus`` properties, takes the place of its own surface."""
     is_domain = any(modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" for modifier in item.modifiers)
@@ -121,6 +137,7 @@ class _Collected:
     view_layer: bpy.types.ViewLayer
     known: dict[int, _MeshArrays] = field(default_factory=dict)
     parts: list[tuple[_MeshArrays, npt.NDArray[np.int32], npt.NDArray[np.int32]]] = field(default_factory=list)
+    names: list[MeshPart] = field(default_factory=list)
     objects: dict[MeshObject, int] = field(default_factory=dict)
     materials: dict[Material, int] = field(default_factory=dict)
 
@@ -137,6 +154,8 @@ class _Collected:
         placed = _placed(arrays, np.array(instance.matrix_world, np.float64))
         materials = slots[np.clip(arrays.slots, 0, len(slots) - 1)]
         self.parts.append((placed, np.full(len(materials), index, np.int32), materials))
+        key = item.name_full, owner.name_full, tuple(instance.persistent_id) if instance.is_instance else ()
+        self.names.append(MeshPart(key, len(placed.vertices), len(placed.triangles)))
 
     def meshes(self) -> Meshes:
         """All together."""
@@ -152,6 +171,7 @@ class _Collected:
             material=_joined([materials for _, _, materials in self.parts], (0,), np.int32),
             objects=tuple(self.objects),
             materials=tuple(self.materials),
+            parts=tuple(self.names),
         )
 
     def _materials_of(self, item: bpy.types.Object) -> list[bpy.types.Material | None]:

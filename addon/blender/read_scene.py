@@ -30,6 +30,19 @@ class Fluid:
     sources: tuple[FluidSource, ...]
 
 
+@dataclass(frozen=True)
+class FluidParts:
+    """The balls of a scene, source by source, and the objects that they come from by :attr:`BallPart.source`."""
+
+    parts: tuple[BallPart, ...]
+    sources: tuple[FluidSource, ...]
+    scene_color: tuple[float, float, float]
+
+    def joined(self) -> Fluid:
+        """All together."""
+        return Fluid(_joined(self.parts, self.scene_color), self.sources)
+
+
 def read_fluid(
     depsgraph: bpy.types.Depsgraph,
     *,
@@ -63,6 +76,17 @@ def read_fluid(
     InputError
         One lacks what its settings ask for.
     """
+    return read_parts(depsgraph, viewport=viewport, space=space, uses_materials=uses_materials).joined()
+
+
+def read_parts(
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    viewport: bool = False,
+    space: bpy.types.SpaceView3D | None = None,
+    uses_materials: bool = False,
+) -> FluidParts:
+    """The same, source by source; the parameters and the errors are those of :func:`read_fluid`."""
     parts: list[BallPart] = []
     indices: dict[str, int] = {}
     objects: list[FluidSource] = []
@@ -76,7 +100,7 @@ def read_fluid(
             replace(part, source=index, colors=own_color if part.colors is None else part.colors)
             for part in _parts_of(source, depsgraph, viewport)
         ]
-    return Fluid(_joined([part for part in parts if len(part)], tuple(settings.color)), tuple(objects))
+    return FluidParts(tuple(part for part in parts if len(part)), tuple(objects), tuple(settings.color))
 
 
 def read_field(scene: bpy.types.Scene) -> Field:

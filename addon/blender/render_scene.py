@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ import bpy
 from ..fluid.camera import Camera
 from ..fluid.cryptomatte import Coverage
 from ..fluid.deep_image import DeepImage
-from ..fluid.errors import CancelledError
+from ..fluid.errors import CancelledError, InputError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
 from ..fluid.look import LOOK_STYLES, Look
@@ -26,15 +26,17 @@ from ..render.backdrop import backdrop
 from ..render.deep import render_deep
 from ..render.image_memory import ImageMemory
 from ..render.method import timed
+from ..render.pass_images import needed_attributes
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
 from ..render.samples import sample_offset
 from ..render.surroundings import Backdrop, Motion
+from .fluid_motion import needs_neighbors, with_motion
 from .preferences import backend_of, threads_of
 from .read_camera import read_camera
 from .read_materials import read_lighting
-from .read_meshes import read_meshes
-from .read_scene import Fluid, read_field, read_fluid, read_look
+from .read_meshes import may_move, read_meshes
+from .read_scene import Fluid, FluidParts, read_field, read_look, read_parts
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 MOST_STEPS = 8
@@ -139,14 +141,29 @@ class _Moment:
         others = self.meshes.objects if self.meshes is not None else ()
         return tuple(item.name for item in (*self.look.sources, *others))
 
-    def backdrop(self, camera: Camera, threads: int, control: Control) -> Backdrop | None:
-        """What else than fluid is seen; None where that is nothing."""
+    def backdrop(self, camera: Camera, threads: int, control: Control, motion: Motion | None = None) -> Backdrop | None:
+        """What else than fluid is seen, with its motion where that is given; None where that is nothing."""
         if self.meshes is None or not len(self.meshes):
             return Backdrop.empty(camera.cropped(), self.background) if self.background[3] > 0 else None
-        lighting = self.look.lighting
         return backdrop(
-            self.meshes, camera.cropped(), lighting, self.background, self.are_holdouts, threads=threads, watch=control.watch
+            self.meshes,
+            camera.cropped(),
+            self.look.lighting,
+            self.background,
+            self.are_holdouts,
+            threads=threads,
+            watch=control.watch,
+            motion=motion,
         )
+
+
+@dataclass(frozen=True)
+class _Neighbor:
+    """What was read of one frame before or after; None for what is not asked for, or cannot be read."""
+
+    camera: Camera | None = None
+    fluid: FluidParts | None = None
+    meshes: Meshes | None = None
 
 
 @dataclass(frozen=True)
@@ -208,7 +225,7 @@ class SceneRender:
             look=moment.look,
             is_cancelled=control.is_cancelled,
             threads=self.settings.threads,
-            backdrop=moment.backdrop(camera, self.settings.threads, control),
+            backdrop=moment.backdrop(camera, self.settings.threads, control, motion),
             motion=motion,
             memory=control.memory,
         )
@@ -239,7 +256,7 @@ class SceneRender:
 def read_view_layer(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, set_frame: SetFrame) -> SceneRender:
     """Read a view layer at the frame that its dependency graph has, with the scene's own look.
 
-    Motion blur and the motion of the camera take the dependency graph to other times, and back.
+    Motion, and motion blur, take the dependency graph to other times, and back.
 
     Raises
     ------
@@ -249,8 +266,8 @@ def read_view_layer(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, se
     milliseconds: dict[str, float] = {}
     with timed(milliseconds, "read"):
         reader = _Reader(depsgraph, settings, set_frame)
-        moment = reader.moment()
-        return SceneRender(settings, moment, reader.motion(), reader.shutter(), milliseconds)
+        moment, motion = reader.moving_moment()
+        return SceneRender(settings, moment, motion, reader.shutter(), milliseconds)
 
 
 @dataclass(frozen=True)
@@ -265,28 +282,76 @@ class _Reader:
 
     def moment(self) -> _Moment:
         """What there is to be seen now."""
+        return self._moment_of(self._fluid().joined(), self._meshes())
+
+    def moving_moment(self) -> tuple[_Moment, Motion | None]:
+        """The same, with the velocities of all fluid and the motion of all else, for those passes that ask for it."""
+        fluid, meshes = self._fluid(), self._meshes()
+        before, after = self._neighbors(fluid, meshes)
+        render = self._scene.render
+        seconds = render.fps_base / render.fps
+        if before.fluid is not None or after.fluid is not None:
+            fluid = with_motion(fluid, before.fluid, after.fluid, seconds)
+        moment = self._moment_of(fluid.joined(), meshes)
+        if "vector" not in self.settings.passes:
+            return moment, None
+        previous, following = (moment.camera if other.camera is None else other.camera for other in (before, after))
+        vertices = (
+            None if meshes is None or other.meshes is None else meshes.vertices_in(other.meshes) for other in (before, after)
+        )
+        return moment, Motion(previous, following, seconds, *vertices)
+
+    def _moment_of(self, fluid: Fluid, meshes: Meshes | None) -> _Moment:
+        """What there is to be seen now, with fluid and meshes that are read already."""
         scene, settings = self._scene, self._scene.meniscus
-        look = read_look(scene, settings.render_style)
-        fluid = read_fluid(self.depsgraph, uses_materials=LOOK_STYLES[look.style].uses_scene)
         lighting = read_lighting(self.depsgraph)
         is_clear = scene.render.film_transparent or not self.depsgraph.view_layer.use_sky
         return _Moment(
             camera=self._camera(),
             fluid=fluid,
             field=read_field(scene),
-            look=replace(look, sources=fluid.sources, lighting=lighting),
+            look=replace(self._look(), sources=fluid.sources, lighting=lighting),
             background=(0.0, 0.0, 0.0, 0.0) if is_clear else (*lighting.world, 1.0),
-            meshes=read_meshes(self.depsgraph) if settings.render_meshes != "NONE" else None,
+            meshes=meshes,
             are_holdouts=settings.render_meshes == "HOLDOUT",
         )
 
-    def motion(self) -> Motion | None:
-        """The camera's from frame to frame, for those who ask for it."""
-        if "vector" not in self.settings.passes:
-            return None
-        render = self._scene.render
-        steps = (-1, 1) if self._camera_moves else (0, 0)
-        return Motion(*map(self._camera_at, steps), render.fps_base / render.fps)
+    def _look(self) -> Look:
+        return read_look(self._scene, self._scene.meniscus.render_style)
+
+    def _fluid(self) -> FluidParts:
+        return read_parts(self.depsgraph, uses_materials=LOOK_STYLES[self._look().style].uses_scene)
+
+    def _meshes(self) -> Meshes | None:
+        return read_meshes(self.depsgraph) if self._scene.meniscus.render_meshes != "NONE" else None
+
+    def _neighbors(self, fluid: FluidParts, meshes: Meshes | None) -> tuple[_Neighbor, _Neighbor]:
+        """What moves, one frame before and one frame after."""
+        needs_vectors = "vector" in self.settings.passes
+        needs_velocities = "velocity" in needed_attributes(self.settings.passes, self._look())
+        objects_move = (needs_vectors or needs_velocities) and self._objects_move
+        readers: dict[str, Callable[[], Any]] = {}
+        if needs_vectors and self._camera_moves:
+            readers["camera"] = self._camera
+        if needs_velocities and needs_neighbors(fluid, objects_move):
+            readers["fluid"] = self._fluid
+        if needs_vectors and objects_move and meshes is not None and len(meshes):
+            readers["meshes"] = self._meshes
+        if not readers:
+            return _Neighbor(), _Neighbor()
+        with self._other_times() as set_time:
+            return self._neighbor(-1, set_time, readers), self._neighbor(1, set_time, readers)
+
+    def _neighbor(
+        self, step: float, set_time: Callable[[float], None], readers: dict[str, Callable[[], Any]]
+    ) -> _Neighbor:
+        set_time(step)
+        found = {}
+        for name, read in readers.items():
+            # What cannot be read there is no reason not to render what is here.
+            with suppress(InputError):
+                found[name] = read()
+        return _Neighbor(**found)
 
     def shutter(self) -> tuple[_Moment, ...]:
         """What is seen while the shutter is open; nothing without motion blur."""
@@ -307,15 +372,15 @@ class _Reader:
             camera.animation_data or camera.parent or camera.constraints or camera.data.animation_data
         )
 
+    @property
+    def _objects_move(self) -> bool:
+        """Whether anything but cameras and lights may be elsewhere in other frames."""
+        scene = self.depsgraph.scene
+        objects = (item for item in self.depsgraph.ids if isinstance(item, bpy.types.Object))
+        return any(may_move(item, scene) for item in objects if item.type not in {"CAMERA", "LIGHT"})
+
     def _camera(self) -> Camera:
         return read_camera(self.depsgraph, self.settings.camera, self.settings.resolution)
-
-    def _camera_at(self, step: int) -> Camera:
-        if step == 0:
-            return self._camera()
-        with self._other_times() as set_time:
-            set_time(step)
-            return self._camera()
 
     def _moment_at(self, step: float, set_time: Callable[[float], None]) -> _Moment:
         set_time(step)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +33,23 @@ class MeshObject:
 
 
 @dataclass(frozen=True)
+class MeshPart:
+    """One mesh at one place among many.
+
+    Attributes
+    ----------
+    key
+        What names it in all frames.
+    vertex_count, triangle_count
+        How many it has.
+    """
+
+    key: Hashable
+    vertex_count: int
+    triangle_count: int
+
+
+@dataclass(frozen=True)
 class Meshes:
     """Triangles, world space, Blender units.
 
@@ -46,6 +65,8 @@ class Meshes:
         (T,) int32: indices into `objects` and `materials`.
     objects, materials
         What the triangles belong to.
+    parts
+        Which follow one another in the arrays; none where meshes of several frames need not be told apart.
 
     Raises
     ------
@@ -60,6 +81,7 @@ class Meshes:
     material: npt.NDArray[np.int32]
     objects: tuple[MeshObject, ...]
     materials: tuple[Material, ...]
+    parts: tuple[MeshPart, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.triangles)
@@ -87,3 +109,21 @@ class Meshes:
 
     def __len__(self) -> int:
         return len(self.triangles)
+
+    def vertices_in(self, other: Meshes) -> npt.NDArray[np.float32] | None:
+        """(V, 3) float32: where the vertices are in another frame; None where all are where they are.
+
+        Parts that are not there, or have other numbers of vertices or triangles, stand still.
+        """
+        there = dict(zip(other.parts, _starts(other.parts), strict=True))
+        vertices = self.vertices.copy()
+        for part, start in zip(self.parts, _starts(self.parts), strict=True):
+            found = there.get(part)
+            if found is not None:
+                vertices[start : start + part.vertex_count] = other.vertices[found : found + part.vertex_count]
+        return None if np.array_equal(vertices, self.vertices) else vertices
+
+
+def _starts(parts: tuple[MeshPart, ...]) -> list[int]:
+    """The first vertex of each part."""
+    return list(accumulate((part.vertex_count for part in parts), initial=0))[:-1]

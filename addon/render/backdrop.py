@@ -13,7 +13,7 @@ from ..fluid.meshes import Meshes
 from ..fluid.passes import DEPTH_BACKGROUND
 from . import native
 from .material_shading import shade_image
-from .surroundings import Backdrop
+from .surroundings import Backdrop, Motion
 from .vector_math import FloatArray
 
 _HOLE = (0.0, 0.0, 0.0, 0.0)
@@ -27,6 +27,7 @@ def backdrop(
     are_holdouts: bool = False,
     threads: int = 0,
     watch: Callable[[float], None] = native.let_interrupt,
+    motion: Motion | None = None,
 ) -> Backdrop:
     """What is seen where no fluid is.
 
@@ -42,6 +43,8 @@ def backdrop(
         Whether all meshes leave holes; else those do that say so.
     threads, watch
         As for :class:`method.Request`.
+    motion
+        Of the meshes, for the Vector pass; None where it is not asked for.
 
     Raises
     ------
@@ -65,6 +68,10 @@ def backdrop(
         material = np.where(shown, meshes.material[triangle], np.int32(-1))
         color[shown] = np.array([item.color for item in meshes.materials], np.float32)[material[shown]]
         shade_image(rgba, depth, normal, color, material, camera, meshes.materials, lighting, threads=threads, watch=watch)
+    sides = (None, None) if motion is None else (motion.previous_vertices, motion.following_vertices)
+    to_previous, to_following = (
+        None if vertices is None else _displacement(meshes, vertices, triangle, camera, threads, watch) for vertices in sides
+    )
     return Backdrop(
         rgba=rgba,
         depth=depth,
@@ -74,6 +81,8 @@ def backdrop(
         is_holdout=is_holdout,
         names=tuple(item.name for item in meshes.objects),
         pass_indices=tuple(item.pass_index for item in meshes.objects),
+        to_previous=to_previous,
+        to_following=to_following,
     )
 
 
@@ -98,3 +107,29 @@ def _rasterized(
             watch=watch,
         )
     return depth, triangle, normal
+
+
+def _displacement(
+    meshes: Meshes,
+    vertices: FloatArray,
+    triangle: npt.NDArray[np.int32],
+    camera: Camera,
+    threads: int,
+    watch: Callable[[float], None],
+) -> FloatArray:
+    """(height, width, 3): the way from what is seen at each pixel to where it is while the meshes have other vertices."""
+    displacement = np.empty((*triangle.shape, 3), np.float32)
+    core = native.load()
+    with native.translated_errors():
+        core.displace(
+            meshes.vertices,
+            meshes.triangles,
+            meshes.normals.reshape(-1, 9),
+            vertices,
+            triangle,
+            displacement,
+            **native.view_arguments(camera),
+            threads=threads,
+            watch=watch,
+        )
+    return displacement

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cached_property
 
@@ -36,6 +36,14 @@ NEEDED: dict[str, Attribute] = {
 }
 
 
+def needed_attributes(names: Iterable[str], look: Look) -> frozenset[Attribute]:
+    """What passes need of the surface, Combined and Alpha with all that their look shows."""
+    asked = set(names)
+    if not asked.isdisjoint({"combined", "alpha"}):
+        asked.update(LOOK_STYLES[look.style].passes)
+    return frozenset(NEEDED[name] for name in asked if name in NEEDED)
+
+
 # Passes that follow from where the surface lies, with the shape of their pixels.
 _PLACES: dict[str, tuple[int, ...]] = {"position": (3,), "facing": (), "vector": (4,), "speed": ()}
 
@@ -54,7 +62,7 @@ class PassImages:
     backdrop
         What else there is.
     motion
-        Of the camera; None where it stands still.
+        Of the camera, which meshes have as ways in the backdrop; None where it stands still.
     names
         The passes that will be asked for.
     """
@@ -168,6 +176,7 @@ class PassImages:
                 self._depth,
                 self._normal,
                 None if self._surface.velocity is None else self._of_fluid(self._velocity, "velocity"),
+                *self._ways_of_others,
                 *(images.get(name) for name in _PLACES),
                 background=DEPTH_BACKGROUND,
                 view=native.view_tuple(request.camera),
@@ -178,6 +187,18 @@ class PassImages:
                 watch=request.watch,
             )
         return images
+
+    @property
+    def _ways_of_others(self) -> tuple[FloatArray | None, FloatArray | None]:
+        """(height, width, 3) each: the ways of other objects to where they are one frame before and after; None for none."""
+        if self._backdrop is None:
+            return None, None
+        others = (self.hit & ~self._fluid)[..., None]
+        before, after = self._backdrop.to_previous, self._backdrop.to_following
+        return (
+            None if before is None else np.where(others, before, np.float32(0)),
+            None if after is None else np.where(others, after, np.float32(0)),
+        )
 
     @cached_property
     def _color(self) -> FloatArray:

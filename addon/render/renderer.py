@@ -14,12 +14,12 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
-from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from .device_image import DeviceImage
 from .image_memory import ImageMemory
 from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
-from .pass_images import NEEDED, PassImages
+from .pass_images import NEEDED, PassImages, needed_attributes
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .surroundings import Backdrop, Motion
 
@@ -171,11 +171,9 @@ class _Shot:
         if threads < 0:
             raise InputError(f"The number of threads must be 0 (one a core) or more, not {threads}")
         look = look or Look()
-        is_shaded = not {"combined", "alpha"}.isdisjoint(names)
-        needed = {*names, *(LOOK_STYLES[look.style].passes if is_shaded else ())}
+        attributes = needed_attributes(names, look)
         if any(source.is_holdout for source in look.sources):
-            needed.add("object_index")
-        attributes = frozenset(NEEDED[name] for name in needed if name in NEEDED)
+            attributes |= {NEEDED["object_index"]}
         choice = _pick_method(method, backend, attributes)
         watch = watch_of(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch)

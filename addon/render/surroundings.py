@@ -1,4 +1,4 @@
-"""What a render knows beside the fluid: what else is seen at each pixel, and how the camera moves."""
+"""What a render knows beside the fluid: what else is seen at each pixel, and how that and the camera move."""
 
 from __future__ import annotations
 
@@ -36,6 +36,9 @@ class Backdrop:
         Of the objects; none where there is no object at all.
     color_behind
         The one colour of `rgba`; None where that differs.
+    to_previous, to_following
+        (height, width, 3): the ways to the places one frame before and one frame after, world space, 0 where there is nothing;
+        None where all stands still or motion was not asked for.
     """
 
     rgba: FloatArray
@@ -47,6 +50,8 @@ class Backdrop:
     names: tuple[str, ...] = ()
     pass_indices: tuple[int, ...] = ()
     color_behind: Color | None = None
+    to_previous: FloatArray | None = None
+    to_following: FloatArray | None = None
 
     @classmethod
     def empty(cls, camera: Camera, rgba: Color = (0.0, 0.0, 0.0, 0.0)) -> Backdrop:
@@ -71,8 +76,20 @@ class Backdrop:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the camera is one frame before and one frame after, and the seconds from one frame to the next."""
+    """What is elsewhere one frame before and one frame after.
+
+    Attributes
+    ----------
+    previous, following
+        The camera.
+    seconds
+        From one frame to the next.
+    previous_vertices, following_vertices
+        (V, 3) float32: those of the meshes, world space; None where they are where they are now.
+    """
 
     previous: Camera
     following: Camera
     seconds: float
+    previous_vertices: FloatArray | None = None
+    following_vertices: FloatArray | None = None

@@ -114,7 +114,7 @@ def test_an_unexpected_error_reaches_the_user(meniscus, scene, monkeypatch):
     def fail(*_arguments, **_settings):
         raise ValueError("nobody expected this")
 
-    monkeypatch.setattr(engine, "read_fluid", fail)
+    monkeypatch.setattr(engine, "read_parts", fail)
     with pytest.raises(RuntimeError, match="nobody expected this"):
         bpy.ops.render.render()
 

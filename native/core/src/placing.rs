@@ -24,6 +24,8 @@ pub struct Surface<'a> {
     pub normal: &'a [[f32; 3]],
     /// World space, units a second; empty for 0.
     pub velocity: &'a [[f32; 3]],
+    /// World space: the ways to where things are one frame before and one after, beside those of the velocity; empty for 0.
+    pub ways: [&'a [[f32; 3]]; 2],
 }
 
 /// The camera one frame before and one after, and the seconds between frames.
@@ -80,7 +82,9 @@ pub fn place(path: Path, view: &View, surface: Surface<'_>, motion: Motion<'_>, 
     let pixels = view.width * view.height;
     let fits = |count: usize| [0, pixels].contains(&count);
     let Places { position, facing, vector, speed } = &places;
-    let sizes_fit = [position.len(), facing.len(), vector.len(), speed.len(), surface.velocity.len()].into_iter().all(fits);
+    let ways = surface.ways.map(<[_]>::len);
+    let targets = [position.len(), facing.len(), vector.len(), speed.len()];
+    let sizes_fit = targets.into_iter().chain(ways).chain([surface.velocity.len()]).all(fits);
     if !sizes_fit || surface.depth.len() != pixels || surface.normal.len() != pixels {
         return Err(Error::InvalidInput("the images must have the size of the camera's".into()));
     }
@@ -165,6 +169,7 @@ struct Block<'a> {
     point: [Numbers; 3],
     normal: &'a [[f32; 3]],
     velocity: &'a [[f32; 3]],
+    ways: [&'a [[f32; 3]]; 2],
 }
 
 impl<'a> Block<'a> {
@@ -184,9 +189,10 @@ impl<'a> Block<'a> {
         }
         let y = view.window[2] + (row as f64 + 0.5) * size[1];
         let is_empty = seen.iter().all(|seen| *seen == 0.0);
-        let velocity = if surface.velocity.is_empty() { &[] } else { &surface.velocity[pixels.clone()] };
-        let mut block =
-            Self { view, is_empty, seen, depth, x, y, point: [[0.0; BLOCK]; 3], normal: &surface.normal[pixels], velocity };
+        let part_of = |image: &'a [[f32; 3]]| if image.is_empty() { image } else { &image[pixels.clone()] };
+        let (velocity, ways) = (part_of(surface.velocity), surface.ways.map(part_of));
+        let (normal, point) = (&surface.normal[pixels.clone()], [[0.0; BLOCK]; 3]);
+        let mut block = Self { view, is_empty, seen, depth, x, y, point, normal, velocity, ways };
         if !is_empty {
             block.find_points();
         }
@@ -243,14 +249,20 @@ impl<'a> Block<'a> {
 
     #[inline(always)]
     fn put_vectors(&self, motion: &Motion<'_>, target: &mut [[f32; 4]]) {
-        let stands_still = self.velocity.is_empty() && *self.view == *motion.previous && *self.view == *motion.following;
+        let nothing_moves = self.velocity.is_empty() && self.ways.iter().all(|way| way.is_empty());
+        let stands_still = nothing_moves && *self.view == *motion.previous && *self.view == *motion.following;
         if self.is_empty || stands_still {
             return target.fill([0.0; 4]);
         }
         let velocity = columns(self.velocity);
         let now = Place::of(self.view, &self.point);
-        let before = Place::of(motion.previous, &moved(&self.point, &velocity, -motion.seconds));
-        let after = Place::of(motion.following, &moved(&self.point, &velocity, motion.seconds));
+        let mut points = [-motion.seconds, motion.seconds].map(|seconds| moved(&self.point, &velocity, seconds));
+        for (points, way) in points.iter_mut().zip(self.ways) {
+            if !way.is_empty() {
+                *points = moved(points, &columns(way), 1.0);
+            }
+        }
+        let (before, after) = (Place::of(motion.previous, &points[0]), Place::of(motion.following, &points[1]));
         let mut vectors = [[0.0; 4]; BLOCK];
         let (past, future) = (difference(&self.seen, &before, &now), difference(&self.seen, &now, &after));
         for (pixel, vector) in vectors.iter_mut().enumerate() {
@@ -361,7 +373,7 @@ mod tests {
         depth[6] = 4.0;
         for is_perspective in [true, false] {
             let cameras = [view(is_perspective, 0.0), view(is_perspective, -0.1), view(is_perspective, 0.3)];
-            let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity };
+            let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity, ways: [&[], &[]] };
             let (mut position, mut facing, mut vector, mut speed) = ([[9.0; 3]; 8], [9.0; 8], [[9.0; 4]; 8], [9.0; 8]);
             let places = Places { position: &mut position, facing: &mut facing, vector: &mut vector, speed: &mut speed };
             let motion = Motion { previous: &cameras[1], following: &cameras[2], seconds: 0.5 };
@@ -379,10 +391,34 @@ mod tests {
     }
 
     #[test]
+    fn ways_are_added_to_what_the_velocity_says() {
+        let (depth, normal, velocity) = (vec![4.0; 8], vec![[0.0; 3]; 8], vec![[1.0, 0.0, 0.0]; 8]);
+        let (back, on) = (vec![[0.25, 0.0, -1.0]; 8], vec![[0.0, 0.0, 2.0]; 8]);
+        let camera = view(false, 0.0);
+        let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
+        let mut vector = [[9.0; 4]; 8];
+        // A pixel is 0.5 wide.
+        for (ways, expected) in [
+            ([&back[..], &on[..]], [-0.5, -2.0, -1.0, -4.0]),
+            ([&[], &on], [-1.0, 0.0, -1.0, -4.0]),
+            ([&back, &[]], [-0.5, -2.0, -1.0, 0.0]),
+        ] {
+            let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity, ways };
+            let places = Places { position: &mut [], facing: &mut [], vector: &mut vector, speed: &mut [] };
+            place(Path::Portable, &camera, surface, motion, places, &Job::default()).unwrap();
+            assert_eq!(vector, [expected; 8]);
+        }
+        let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &[], ways: [&back, &[]] };
+        let places = Places { position: &mut [], facing: &mut [], vector: &mut vector, speed: &mut [] };
+        place(Path::Portable, &camera, surface, motion, places, &Job::default()).unwrap();
+        assert_eq!(vector, [[0.5, -2.0, 0.0, 0.0]; 8]);
+    }
+
+    #[test]
     fn what_passes_the_eye_has_no_motion_there() {
         let (depth, normal, velocity) = (vec![4.0; 8], vec![[0.0; 3]; 8], vec![[0.0, 20.0, 0.0]; 8]);
         let camera = view(true, 0.0);
-        let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity };
+        let surface = Surface { depth: &depth, background: 1e10, normal: &normal, velocity: &velocity, ways: [&[], &[]] };
         let mut vector = [[9.0; 4]; 8];
         let places = Places { position: &mut [], facing: &mut [], vector: &mut vector, speed: &mut [] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
@@ -403,7 +439,7 @@ mod tests {
     #[test]
     fn sizes_must_fit() {
         let camera = view(true, 0.0);
-        let surface = Surface { depth: &[1.0; 8], background: 1e10, normal: &[[0.0; 3]; 8], velocity: &[] };
+        let surface = Surface { depth: &[1.0; 8], background: 1e10, normal: &[[0.0; 3]; 8], velocity: &[], ways: [&[], &[]] };
         let motion = Motion { previous: &camera, following: &camera, seconds: 0.5 };
         let places = Places { position: &mut [], facing: &mut [0.0; 7], vector: &mut [], speed: &mut [] };
         assert!(place(Path::Portable, &camera, surface, motion, places, &Job::default()).is_err());

@@ -20,7 +20,7 @@ mod meniscus_native {
     #[pymodule_export]
     use super::oracle::{oracle_cast, oracle_crossings};
     #[pymodule_export]
-    use super::rasterizer::rasterize;
+    use super::rasterizer::{displace, rasterize};
     #[pymodule_export]
     use super::shading::{label, place, shade_image, shade_points};
     #[pymodule_export]

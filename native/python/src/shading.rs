@@ -108,17 +108,21 @@ pub fn shade_points(
 
 /// Fills what follows from where the surface of an image lies; what is None is left out.
 ///
-/// depth (height, width), normal (height, width, 3) and velocity (height, width, 3) or None: float32, world space. position
-/// (height, width, 3), facing (height, width), vector (height, width, 4), speed (height, width): float32, to be written.
+/// depth (height, width), normal (height, width, 3) and velocity (height, width, 3) or None: float32, world space. to_previous,
+/// to_following (height, width, 3) or None: float32, the ways to the places one frame before and one after, beside those of the
+/// velocity. position (height, width, 3), facing (height, width), vector (height, width, 4), speed (height, width): float32, to
+/// be written.
 #[pyfunction]
-#[pyo3(signature = (depth, normal, velocity, position, facing, vector, speed, *, background, view, previous, following, seconds,
-                    threads=0, watch=None))]
+#[pyo3(signature = (depth, normal, velocity, to_previous, to_following, position, facing, vector, speed, *, background, view,
+                    previous, following, seconds, threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
-pub fn place(
-    python: Python<'_>,
-    depth: &Bound<'_, PyAny>,
-    normal: &Bound<'_, PyAny>,
-    velocity: Option<&Bound<'_, PyAny>>,
+pub fn place<'py>(
+    python: Python<'py>,
+    depth: &Bound<'py, PyAny>,
+    normal: &Bound<'py, PyAny>,
+    velocity: Option<&Bound<'py, PyAny>>,
+    to_previous: Option<&Bound<'py, PyAny>>,
+    to_following: Option<&Bound<'py, PyAny>>,
     position: Option<&Bound<'_, PyAny>>,
     facing: Option<&Bound<'_, PyAny>>,
     vector: Option<&Bound<'_, PyAny>>,
@@ -135,7 +139,11 @@ pub fn place(
     let size = [view.width, view.height];
     let (depth, normal) =
         (ReadPixels::<f32, 1>::borrow("depth", depth, size)?, ReadPixels::<f32, 3>::borrow("normal", normal, size)?);
-    let velocity = velocity.map(|velocity| ReadPixels::<f32, 3>::borrow("velocity", velocity, size)).transpose()?;
+    let motion_image = |name: &str, image: Option<&Bound<'py, PyAny>>| {
+        image.map(|image| ReadPixels::<f32, 3>::borrow(name, image, size)).transpose()
+    };
+    let velocity = motion_image("velocity", velocity)?;
+    let ways = [motion_image("to_previous", to_previous)?, motion_image("to_following", to_following)?];
     let mut position = position.map(|image| Pixels::<f32, 3>::borrow("position", image, size)).transpose()?;
     let mut facing = facing.map(|image| Pixels::<f32, 1>::borrow("facing", image, size)).transpose()?;
     let mut vector = vector.map(|image| Pixels::<f32, 4>::borrow("vector", image, size)).transpose()?;
@@ -145,6 +153,7 @@ pub fn place(
         background,
         normal: normal.rows(),
         velocity: velocity.as_ref().map_or(&[], |velocity| velocity.rows()),
+        ways: ways.each_ref().map(|way| way.as_ref().map_or(&[][..], |way| way.rows())),
     };
     let places = Places {
         position: written(&mut position)?.as_chunks_mut().0,

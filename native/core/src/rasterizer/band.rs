@@ -19,8 +19,8 @@ const CHECKED: usize = 256;
 
 /// Where in the window the pixel centres of each column and row lie.
 pub struct Centers {
-    columns: Vec<f64>,
-    rows: Vec<f64>,
+    pub columns: Vec<f64>,
+    pub rows: Vec<f64>,
 }
 
 impl Centers {

@@ -7,12 +7,14 @@
 
 mod band;
 mod bins;
+mod displacement;
 mod triangle;
 
 use rayon::prelude::*;
 
 use self::band::{BAND, Band, Centers, Rows};
 use self::bins::Bins;
+pub use self::displacement::displace;
 use self::triangle::Corners;
 use crate::error::{Error, Result};
 use crate::job::Job;

@@ -277,3 +277,53 @@ fn unusable_arguments_are_told() {
     let (depth, ..) = seen(&[[f32::NAN; 3], [0.0; 3], [1.0; 3]], &[[0, 1, 2]], &view(true, 2, 2));
     assert_eq!(depth, [1e10; 4]);
 }
+
+#[test]
+fn displacements_are_blends_of_the_corners() {
+    // Of depths that differ, so that shares in space are not those in the image.
+    let vertices = [[-4.0, -4.0, 4.0], [4.0, -4.0, 4.0], [0.0, 8.0, 12.0], [9.0, 9.0, 9.0]];
+    let linear = |[x, y, z]: [f32; 3]| [x + 0.5 * y - z + 1.0, 2.0 * z, -x];
+    let elsewhere = vertices.map(linear);
+    let corners = [[0, 1, 2]];
+    let normals = [[0.0; 9]];
+    let triangles = Triangles::new(&vertices, &corners, &normals).unwrap();
+    for is_perspective in [true, false] {
+        let mut view = view(is_perspective, 5, 4);
+        view.window = if is_perspective { [-2.0, 2.0, -2.0, 2.0] } else { [-8.0, 8.0, -8.0, 8.0] };
+        let (depth, triangle, _) = seen(&vertices, &corners, &view);
+        assert!(triangle.contains(&0) && triangle.contains(&NO_TRIANGLE));
+        let mut displacement = [[9.0; 3]; 20];
+        displace(&triangles, &elsewhere, &view, &triangle, &mut displacement, &Job::default()).unwrap();
+        for (pixel, found) in displacement.iter().enumerate() {
+            let expected = if triangle[pixel] == NO_TRIANGLE {
+                [0.0; 3]
+            } else {
+                let scale = if is_perspective { depth[pixel] } else { 1.0 };
+                let [x, y] = view.pixel_center(pixel % 5, pixel / 5).map(|number| number as f32 * scale);
+                let (here, there) = ([x, y, depth[pixel]], linear([x, y, depth[pixel]]));
+                [0, 1, 2].map(|axis| there[axis] - here[axis])
+            };
+            assert!(
+                found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-4),
+                "{found:?} {expected:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn displacements_need_what_was_seen() {
+    let (vertices, normals) = ([[0.0; 3]; 3], [[0.0; 9]]);
+    let triangles = Triangles::new(&vertices, &[[0, 1, 2]], &normals).unwrap();
+    let view = view(true, 2, 1);
+    let mut displacement = [[9.0; 3]; 2];
+    let mut try_with = |elsewhere: &[[f32; 3]], triangle: &[i32]| {
+        displace(&triangles, elsewhere, &view, triangle, &mut displacement, &Job::default())
+    };
+    assert!(try_with(&vertices, &[0, 1]).is_err());
+    assert!(try_with(&vertices[..2], &[0, 0]).is_err());
+    assert!(try_with(&vertices, &[0]).is_err());
+    // A triangle without area has no shares.
+    try_with(&[[1.0; 3]; 3], &[0, NO_TRIANGLE]).unwrap();
+    assert_eq!(displacement, [[0.0; 3]; 2]);
+}
