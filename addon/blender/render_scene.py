@@ -342,9 +342,7 @@ class _Reader:
         with self._other_times() as set_time:
             return self._neighbor(-1, set_time, readers), self._neighbor(1, set_time, readers)
 
-    def _neighbor(
-        self, step: float, set_time: Callable[[float], None], readers: dict[str, Callable[[], Any]]
-    ) -> _Neighbor:
+    def _neighbor(self, step: float, set_time: Callable[[float], None], readers: dict[str, Callable[[], Any]]) -> _Neighbor:
         set_time(step)
         found = {}
         for name, read in readers.items():

@@ -48,7 +48,8 @@ def velocities_between(now: FloatArray, before: FloatArray, after: FloatArray, s
     """
     was, will = (np.isfinite(side).all(axis=1, keepdims=True) for side in (before, after))
     frames = np.maximum(was.astype(np.float32) + will, 1)
-    return (np.where(will, after, now) - np.where(was, before, now)) / (frames * np.float32(seconds))
+    ways: FloatArray = np.where(will, after, now) - np.where(was, before, now)
+    return ways / (frames * np.float32(seconds))
 
 
 def _are_unique(ids: Ids) -> bool:

@@ -105,6 +105,27 @@ def test_data_passes(scene, render):
     assert np.abs(expected["ViewLayer.Vector.X"] - expected["ViewLayer.Vector.Z"])[inner].min() > 1
 
 
+@pytest.mark.parametrize("own", [None, 0.25], ids=["positions", "velocities of a moving object"])
+def test_vectors_of_fluid_that_its_object_moves(scene, render, own):
+    """Points without velocities, and such whose velocities are a part of the motion, as Cycles adds both."""
+    fluid = scene.objects["Fluid"]
+    if own is None:
+        fluid.data.attributes.remove(fluid.data.attributes["velocity"])
+    else:
+        fluid.data.attributes["velocity"].data.foreach_set("vector", np.tile(VELOCITY * 2.4 * own, len(CENTRES)))
+    for frame in (4, 6):
+        fluid.location = (frame - 5) * VELOCITY / 10 * (1 - (own or 0))
+        fluid.keyframe_insert("location", frame=frame)
+    _make_linear(fluid)
+    (expected, _), (actual, _) = render("CYCLES"), render("MENISCUS")
+    hit = actual["ViewLayer.Depth.Z"] < 1e9
+    inner = np.all([np.roll(hit, (y, x), (0, 1)) for x in (-1, 0, 1) for y in (-1, 0, 1)], axis=0)
+    for channel in "XYZW":
+        name = f"ViewLayer.Vector.{channel}"
+        assert np.quantile(np.abs(actual[name] - expected[name])[inner], 0.98) <= 0.05, name
+    assert np.abs(expected["ViewLayer.Vector.Y"][inner]).min() > 1
+
+
 def test_cryptomatte(scene, render):
     (expected, cycles), (actual, header) = render("CYCLES"), render("MENISCUS")
     manifests = []

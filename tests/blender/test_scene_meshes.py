@@ -134,6 +134,54 @@ def test_points_and_their_particles_are_not_shown_twice(scene, render):
     assert (render("MENISCUS")[index] == 9).sum() > 1.3 * covered > 0
 
 
+def test_vectors_are_those_of_cycles(scene, render):
+    """Of meshes that move, turn, grow, are deformed, carried along, instanced or stand still, by a camera that moves too."""
+    collection, camera = scene.collection, scene.objects["Camera"]
+    floor = add_mesh(collection, bpy.ops.mesh.primitive_plane_add, "Floor")
+    floor.scale, floor.location = (40, 40, 1), (0, 0, -1.2)
+    head = add_mesh(collection, bpy.ops.mesh.primitive_monkey_add, "Head", smooth=True)
+    head.location = (-1.5, 0, 0.5)
+    cube = add_mesh(collection, bpy.ops.mesh.primitive_cube_add, "Cube")
+    cube.parent, cube.location, cube.scale = head, (3, 0, -0.5), (0.5, 0.4, 0.6)
+    grid = add_mesh(collection, lambda: bpy.ops.mesh.primitive_grid_add(x_subdivisions=9, y_subdivisions=9), "Grid")
+    grid.location, grid.rotation_euler = (0.8, 1, 1.5), (1.3, 0, 0.3)
+    grid.shape_key_add(name="Basis")
+    bent = grid.shape_key_add(name="Bent")
+    for point in bent.data:
+        point.co.z, point.co.x = point.co.x * point.co.y, 0.7 * point.co.x
+    group = bpy.data.collections.new("Group")
+    cone = add_mesh(group, bpy.ops.mesh.primitive_cone_add, "Cone")
+    cone.scale = (0.6, 0.6, 0.6)
+    empty = instance_collection(scene, group, location=(2.5, 2, 0.5))
+    motions = (
+        (camera, "location", [(1, -7, 2), (1.02, -6.9, 2), (1.1, -6.8, 2.05)]),
+        (head, "rotation_euler", [(0.2, 0.1, 0.6), (0.22, 0.1, 0.7), (0.2, 0.12, 0.9)]),
+        (head, "scale", [(-1, 1.2, 0.8), (-1, 1.1, 0.8), (-1.05, 1.1, 0.8)]),
+        (empty, "rotation_euler", [(1.1, 0, 0), (1, 0.1, 0), (0.8, 0.1, 0)]),
+    )
+    for item, path, values in motions:
+        for frame, value in enumerate(values, 4):
+            setattr(item, path, value)
+            item.keyframe_insert(path, frame=frame)
+    for frame, value in enumerate((0.1, 0.3, 0.4), 4):
+        bent.value = value
+        bent.keyframe_insert("value", frame=frame)
+    scene.frame_set(5)
+    scene.view_layers[0].use_pass_vector = True
+    scene.objects["Fluid"].location = (0, -100, 0)
+    expected, actual = render("CYCLES"), render("MENISCUS")
+    both = (actual["ViewLayer.Depth.Z"] < 1e9) & np.isclose(
+        actual["ViewLayer.Depth.Z"], expected["ViewLayer.Depth.Z"], rtol=1e-3
+    )
+    assert both.mean() > 0.7
+    for channel in "XYZW":
+        name = f"ViewLayer.Vector.{channel}"
+        difference = np.abs(actual[name] - expected[name])[both]
+        assert np.quantile(difference, 0.985) < 0.02, name
+        assert np.ptp(expected[name][both]) > 1.5, name
+    assert not actual["ViewLayer.Vector.X"][~(actual["ViewLayer.Depth.Z"] < 1e9)].any()
+
+
 def test_motion_of_meshes_counts_in_the_blur(scene, render):
     cube = add_mesh(scene.collection, bpy.ops.mesh.primitive_cube_add, "Cube")
     for frame in (1, 3):

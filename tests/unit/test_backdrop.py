@@ -11,9 +11,10 @@ import meniscus
 from meniscus.addon.fluid.camera import Region, Window
 from meniscus.addon.fluid.errors import CancelledError, InputError
 from meniscus.addon.fluid.lighting import Light, Lighting, Material
-from meniscus.addon.fluid.meshes import Meshes, MeshObject
+from meniscus.addon.fluid.meshes import Meshes, MeshObject, MeshPart
 from meniscus.addon.fluid.passes import DEPTH_BACKGROUND
 from meniscus.addon.render.backdrop import backdrop
+from meniscus.addon.render.surroundings import Motion
 
 DARK = Lighting((), (0.0, 0.0, 0.0))
 
@@ -170,6 +171,35 @@ def test_holdouts_leave_holes_and_the_rest_is_shaded():
     np.testing.assert_array_equal(found.color[found.object == 1], [(0.25, 0.5, 0.75)] * len(shown))
     every = backdrop(meshes, camera, lighting, (1, 0, 1, 1), are_holdouts=True)
     assert not every.rgba[every.object >= 0].any()
+
+
+def test_vertices_that_move_take_what_is_seen_along(camera):
+    """By an affine transform every point moves as the corners do."""
+    random = np.random.default_rng(8)
+    meshes = meshes_of(random.uniform(-1.5, 1.5, (30, 1, 3)) + random.normal(0, 0.5, (30, 3, 3)))
+    turn, move = random.normal(0, 0.5, (3, 3)), np.array((0.3, -0.2, 0.5))
+    elsewhere = (meshes.vertices @ turn + move).astype(np.float32)
+    found = seen(meshes, camera, motion=Motion(camera, camera, 1.0, None, elsewhere))
+    origins, directions = world_rays(camera)
+    is_seen = found.object >= 0
+    assert is_seen.mean() > 0.1
+    points = (origins + found.depth[..., None] * directions)[is_seen]
+    np.testing.assert_allclose(found.to_following[is_seen], points @ turn + move - points, atol=1e-4)
+    assert not found.to_following[~is_seen].any()
+    assert found.to_previous is None
+    assert seen(meshes, camera).to_following is None
+
+
+def test_vertices_are_found_in_another_frame_part_by_part():
+    def meshes(*heights, parts):
+        corners = [np.full((3, 3), height, float) for height in heights]
+        return replace(meshes_of(corners), parts=tuple(parts))
+
+    now = meshes(0, 1, 2, 3, parts=[MeshPart("a", 3, 1), MeshPart("b", 6, 2), MeshPart("c", 3, 1)])
+    other = meshes(7, 8, 9, parts=[MeshPart("c", 3, 1), MeshPart("b", 3, 1), MeshPart("a", 3, 1)])
+    np.testing.assert_array_equal(now.vertices_in(other)[::3, 0], [9, 1, 2, 7])
+    assert now.vertices_in(replace(now)) is None
+    assert now.vertices_in(meshes(7, parts=[MeshPart("d", 3, 1)])) is None
 
 
 def test_nothing_gives_the_background():

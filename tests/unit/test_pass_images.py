@@ -112,6 +112,27 @@ def test_passes_of_motion():
     assert not image["vector"][~image.hit].any()
 
 
+def test_other_objects_have_ways_of_their_own():
+    """Where they are seen; fluid before them moves as the fluid does."""
+    shape = (CAMERA.height, CAMERA.width, 3)
+    back, on = np.full(shape, (0.2, 0, -0.1), np.float32), np.full(shape, (0, 0.5, 0.3), np.float32)
+    still = Motion(CAMERA, CAMERA, 0.5)
+    columns = {"velocities": [(0, 0, 0.4)] * 2}
+    fluid = passes(motion=still, **columns)
+    image = passes(replace(wall(6.5), to_previous=back, to_following=on), motion=still, **columns)
+    np.testing.assert_array_equal(image["vector"][fluid.hit], fluid["vector"][fluid.hit])
+    others = ~fluid.hit
+    x, y, z = image["position"][others].astype(float).T
+    scale = CAMERA.height / (2 * np.tan(0.3))
+    expected = [0.2 / (y + 5), -0.1 / (y + 5), x / (y + 5) - x / (y + 5.5), z / (y + 5) - (z + 0.3) / (y + 5.5)]
+    np.testing.assert_allclose(image["vector"][others], scale * np.transpose(expected), atol=1e-4)
+    one_sided = passes(replace(wall(6.5), to_following=on), motion=still, **columns)["vector"][others]
+    np.testing.assert_array_equal(one_sided[:, 2:], image["vector"][others][:, 2:])
+    assert not one_sided[:, :2].any()
+    hole = passes(replace(wall(6.5, is_holdout=True), to_previous=back), motion=still, **columns)
+    assert not hole["vector"][others].any()
+
+
 def test_facing_is_one_in_the_middle_and_falls_to_the_border():
     image = passes()
     assert image["facing"][CENTRE] > 0.9999
