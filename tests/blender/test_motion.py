@@ -115,28 +115,64 @@ def test_without_neighbours_nothing_is_known_to_move(scene, read):
 
 
 def test_meshes_move_part_by_part(scene, read):
-    """One moves, one changes its number of vertices, one is there at this frame only."""
-    cubes = [add_cube(scene) for _ in range(3)]
-    animate(cubes[0], "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
-    for cube in cubes[1:]:
+    """One is there at this frame only, one changes its number of vertices."""
+    guest, steady, growing = (add_cube(scene) for _ in range(3))
+    for cube in (guest, steady, growing):
         animate(cube, "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
-    array = cubes[1].modifiers.new("Array", "ARRAY")
-    for frame, count in ((4, 1), (5, 2), (6, 2)):
-        array.count = count
-        array.keyframe_insert("count", frame=frame)
-    for frame, hidden in ((4, True), (5, False), (6, True)):
-        cubes[2].hide_viewport = hidden
-        cubes[2].hide_render = hidden
-        for path in ("hide_viewport", "hide_render"):
-            cubes[2].keyframe_insert(path, frame=frame)
+    for path in ("hide_viewport", "hide_render"):
+        animate(guest, path, [True, False, True])
+    animate(growing.modifiers.new("Array", "ARRAY"), "count", [1, 2, 2])
     scene.frame_set(5)
     _, motion, _ = read("vector")
-    heights = [
+    before, after = (
         vertices[:, 2].reshape(-1, 8).mean(axis=1).round(3).tolist()
         for vertices in (motion.previous_vertices, motion.following_vertices)
-    ]
-    assert sorted(heights[0]) == [0, 1, 1, 1]
-    assert sorted(heights[1]) == [1, 4, 4, 4]
+    )
+    assert before == [1, 0, 1, 1]
+    assert after == [1, 4, 4, 4]
+
+
+def _moving_light(scene):
+    """What moves without being a surface."""
+    light = add_object(scene.collection, "Light", bpy.data.lights.new("Light", "POINT"))
+    animate(light, "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
+    return light
+
+
+def _parent(scene, item):
+    item.parent = _moving_light(scene)
+
+
+def _constraint(scene, item):
+    item.constraints.new("COPY_LOCATION").target = _moving_light(scene)
+
+
+def _shape_key(scene, item):
+    item.shape_key_add(name="Basis")
+    key = item.shape_key_add(name="Flat")
+    for point in key.data:
+        point.co.z = 0
+    animate(key, "value", [0, 0.5, 1])
+
+
+def _modifier(scene, item):
+    item.modifiers.new("Wave", "WAVE")
+
+
+def _data(scene, item):
+    curve = bpy.data.curves.new("Curve", "FONT")
+    curve.body = "M"
+    animate(curve, "extrude", [0.1, 0.2, 0.3])
+    add_object(scene.collection, "Text", curve)
+
+
+@pytest.mark.parametrize("make_move", [_parent, _constraint, _shape_key, _modifier, _data])
+def test_what_moves_is_noticed(scene, read, make_move):
+    make_move(scene, add_cube(scene))
+    scene.frame_set(5)
+    _, motion, frames = read("vector")
+    assert frames == [4, 6, 5]
+    assert motion.previous_vertices is not None
 
 
 class TestMatching:

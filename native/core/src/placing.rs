@@ -256,19 +256,22 @@ impl<'a> Block<'a> {
         }
         let velocity = columns(self.velocity);
         let now = Place::of(self.view, &self.point);
-        let mut points = [-motion.seconds, motion.seconds].map(|seconds| moved(&self.point, &velocity, seconds));
-        for (points, way) in points.iter_mut().zip(self.ways) {
-            if !way.is_empty() {
-                *points = moved(points, &columns(way), 1.0);
-            }
-        }
-        let (before, after) = (Place::of(motion.previous, &points[0]), Place::of(motion.following, &points[1]));
+        let past = self.at(&velocity, -motion.seconds, self.ways[0]);
+        let future = self.at(&velocity, motion.seconds, self.ways[1]);
+        let (before, after) = (Place::of(motion.previous, &past), Place::of(motion.following, &future));
         let mut vectors = [[0.0; 4]; BLOCK];
         let (past, future) = (difference(&self.seen, &before, &now), difference(&self.seen, &now, &after));
         for (pixel, vector) in vectors.iter_mut().enumerate() {
             *vector = [past[0][pixel], past[1][pixel], future[0][pixel], future[1][pixel]];
         }
         target.copy_from_slice(&vectors[..target.len()]);
+    }
+
+    /// Where the points are after so many seconds and a way beside; no way for 0.
+    #[inline(always)]
+    fn at(&self, velocity: &[Numbers; 3], seconds: f64, way: &[[f32; 3]]) -> [Numbers; 3] {
+        let points = moved(&self.point, velocity, seconds);
+        if way.is_empty() { points } else { moved(&points, &columns(way), 1.0) }
     }
 
     #[inline(always)]
