@@ -150,12 +150,13 @@ def _header(part: ExrPart) -> dict[str, Any]:
 def _channels(part: ExrPart) -> dict[str, npt.NDArray[Any]]:
     """The channels as OpenEXR takes them: of a deep image (height, width) objects, arrays of samples or None."""
     if part.counts is None:
-        return dict(part.channels)
+        return {name: channel.pixels() for name, channel in part.channels.items()}
     counts = part.counts.reshape(-1)
     places = np.flatnonzero(counts)
     ends = np.cumsum(counts[places])[:-1]
     channels = {}
-    for name, values in part.channels.items():
+    for name, channel in part.channels.items():
+        values = channel.pixels()
         pixels = np.full(counts.shape, None, object)
         pixels[0] = values[:0]  # tells the type where there is no sample at all
         if len(places):

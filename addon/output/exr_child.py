@@ -7,9 +7,11 @@ the same order. The answer is one line of JSON: the error's kind and sentence, e
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from io import BufferedReader, BufferedWriter
 from typing import IO, Any
 
@@ -18,25 +20,28 @@ import numpy.typing as npt
 
 from ..fluid.errors import FullDiskError, MeniscusError, OutputError
 from .exr import write_content
-from .exr_content import ExrContent, ExrPart
+from .exr_content import Channel, ExrContent, ExrPart
 
 
 def send_request(stream: IO[bytes], path: str, content: ExrContent) -> None:
     """The parent's side: ask for `content` to be written to `path`."""
     parts = [
-        {"attributes": part.attributes, "arrays": [[name, values.dtype.name, values.shape] for name, values in _arrays(part)]}
+        {
+            "attributes": part.attributes,
+            "arrays": [[name, channel.dtype.name, channel.values.shape] for name, channel in _arrays(part)],
+        }
         for part in content.parts
     ]
     stream.write(json.dumps({"path": path, "parts": parts}).encode() + b"\n")
     for part in content.parts:
-        for _, values in _arrays(part):
-            stream.write(values.data)
+        for _, channel in _arrays(part):
+            stream.write(channel.pixels().data)
     stream.flush()
 
 
-def _arrays(part: ExrPart) -> list[tuple[str | None, npt.NDArray[Any]]]:
+def _arrays(part: ExrPart) -> list[tuple[str | None, Channel]]:
     """The channels by name, and under no name the counts of a deep part."""
-    counts = [] if part.counts is None else [(None, part.counts)]
+    counts = [] if part.counts is None else [(None, Channel(part.counts))]
     return [*part.channels.items(), *counts]
 
 
@@ -63,10 +68,10 @@ def serve() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # An exit by exception, so that a temporary file is removed.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
-    requests = os.fdopen(sys.stdin.fileno(), "rb", closefd=False)
+    requests = _Requests(os.fdopen(sys.stdin.fileno(), "rb", closefd=False))
     with _private_stdout() as answers:
-        while head := requests.readline():
-            answers.write(json.dumps(_answer(requests, head)).encode() + b"\n")
+        for path, content in requests:
+            answers.write(json.dumps(_answer(path, content)).encode() + b"\n")
             answers.flush()
 
 
@@ -77,24 +82,52 @@ def _private_stdout() -> BufferedWriter:
     return answers
 
 
-def _answer(requests: BufferedReader, head_line: bytes) -> tuple[str, str]:
-    head = json.loads(head_line)
-    parts = [_read_part(requests, part) for part in head["parts"]]
+def _answer(path: str, content: ExrContent) -> tuple[str, str]:
     try:
-        write_content(head["path"], ExrContent(tuple(parts)))
+        write_content(path, content)
     except MeniscusError as error:
         return type(error).__name__, str(error)
     return "", ""
 
 
-def _read_part(requests: BufferedReader, head: dict[str, Any]) -> ExrPart:
-    arrays = {name: _read_array(requests, dtype, shape) for name, dtype, shape in head["arrays"]}
-    counts = arrays.pop(None, None)
-    return ExrPart(head["attributes"], arrays, counts)
+class _Requests:
+    """What the parent asks for, one path and content after the other; each lies where the one before it lay.
+
+    The system takes longer to give fresh memory than a pipe takes to fill what is there.
+    """
+
+    def __init__(self, stream: BufferedReader) -> None:
+        self._stream = stream
+        self._memory = np.empty(0, np.uint8)
+
+    def __iter__(self) -> Iterator[tuple[str, ExrContent]]:
+        while line := self._stream.readline():
+            head = json.loads(line)
+            yield head["path"], ExrContent(tuple(self._parts(head["parts"])))
+
+    def _parts(self, heads: list[dict[str, Any]]) -> Iterator[ExrPart]:
+        room = sum(_room(dtype, shape) for head in heads for _, dtype, shape in head["arrays"])
+        if self._memory.nbytes < room:
+            self._memory = np.empty(room, np.uint8)
+        free = self._memory
+        for head in heads:
+            arrays = {}
+            for name, dtype, shape in head["arrays"]:
+                arrays[name] = self._read(free[: _bytes(dtype, shape)].view(dtype).reshape(shape))
+                free = free[_room(dtype, shape) :]
+            counts = arrays.pop(None, None)
+            yield ExrPart(head["attributes"], {name: Channel(values) for name, values in arrays.items()}, counts)
+
+    def _read(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        if values.nbytes and self._stream.readinto(values.data.cast("B")) != values.nbytes:
+            sys.exit("Meniscus ended in the middle of an image, which was not written")
+        return values
 
 
-def _read_array(stream: BufferedReader, dtype: str, shape: list[int]) -> npt.NDArray[Any]:
-    values = np.empty(shape, dtype)
-    if values.nbytes and stream.readinto(values.data.cast("B")) != values.nbytes:
-        sys.exit("Meniscus ended in the middle of an image, which was not written")
-    return values
+def _bytes(dtype: str, shape: list[int]) -> int:
+    return np.dtype(dtype).itemsize * math.prod(shape)
+
+
+def _room(dtype: str, shape: list[int]) -> int:
+    """Bytes to the next array, which begins where any type may."""
+    return -(-_bytes(dtype, shape) // 64) * 64

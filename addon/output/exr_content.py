@@ -48,6 +48,35 @@ _NDC_FROM_CLIP = np.array([[0.5, 0, 0, 0.5], [0, -0.5, 0, 0.5], [0, 0, 0.5, 0.5]
 
 
 @dataclass(frozen=True)
+class Channel:
+    """One channel, not yet as the file holds it: the writer converts it, so that the thread that renders need not wait.
+
+    Attributes
+    ----------
+    values
+        float32 or float16, in any order in memory, row 0 at the top: (height, width), or of a deep image (samples,), pixel
+        after pixel.
+    is_half
+        Whether the file holds half floats.
+    """
+
+    values: npt.NDArray[Any]
+    is_half: bool = False
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """What the file holds."""
+        return np.dtype(np.float16) if self.is_half else self.values.dtype
+
+    def pixels(self) -> npt.NDArray[Any]:
+        """What the file holds, row after row; half floats are clamped to their range."""
+        values = self.values
+        if values.dtype != self.dtype:
+            return np.clip(values, -HALF_MAX, HALF_MAX).astype(self.dtype, order="C")
+        return np.ascontiguousarray(values)
+
+
+@dataclass(frozen=True)
 class ExrPart:
     """One image of a file.
 
@@ -56,13 +85,13 @@ class ExrPart:
     attributes
         Header attributes by name as plain data: numbers, text and lists.
     channels
-        float16 or float32 by channel name, row 0 at the top: (height, width), or of a deep image (samples,), pixel after pixel.
+        By channel name.
     counts
         (height, width) int32: samples of each pixel of a deep image; None for a flat one.
     """
 
     attributes: dict[str, Any]
-    channels: dict[str, npt.NDArray[Any]]
+    channels: dict[str, Channel]
     counts: npt.NDArray[np.int32] | None = None
 
 
@@ -111,7 +140,7 @@ class ExrOptions:
 
 
 def flat_content(image: ImageBuffers, options: ExrOptions = ExrOptions()) -> ExrContent:
-    """All passes and mattes of an image, see :func:`exr.write_exr`."""
+    """All passes and mattes of an image, see :func:`exr.write_exr`; its arrays are referred to, not copied."""
     attributes = _attributes(image.camera, options)
     images = {
         f"{options.view_layer}.{PASSES[name].blender_name}": _pass_channels(PASSES[name], values)
@@ -120,10 +149,10 @@ def flat_content(image: ImageBuffers, options: ExrOptions = ExrOptions()) -> Exr
     if image.cryptomatte is not None:
         attributes |= image.cryptomatte.metadata(options.view_layer)
         for name, layer in image.cryptomatte.layers.items():
-            images[f"{options.view_layer}.{name}"] = dict(zip("rgba", np.moveaxis(layer[::-1], 2, 0), strict=True))
+            planes = map(Channel, np.moveaxis(layer[::-1], 2, 0))
+            images[f"{options.view_layer}.{name}"] = dict(zip("rgba", planes, strict=True))
     parts = {
-        name: {f"{name}.{channel}": np.ascontiguousarray(values) for channel, values in channels.items()}
-        for name, channels in images.items()
+        name: {f"{name}.{last}": channel for last, channel in channels.items()} for name, channels in images.items()
     }
     if options.is_multipart:
         return ExrContent(tuple(ExrPart({**attributes, "name": name}, channels) for name, channels in parts.items()))
@@ -143,14 +172,12 @@ def deep_content(image: DeepImage, options: ExrOptions = ExrOptions(compression=
             f"Deep images cannot be compressed by {options.compression}: choose from {', '.join(DEEP_COMPRESSIONS)}"
         )
     order, counts = _from_the_top(image.counts)
-    colors = np.clip(image.rgba[order], -HALF_MAX, HALF_MAX).astype(np.float16)
-    columns = {
-        **{channel: colors[:, index] for index, channel in enumerate("RGBA")},
-        "Z": image.enter[order],
-        "ZBack": image.leave[order],
-        **{f"N.{axis}": image.normal[order, index] for index, axis in enumerate("XYZ")},
+    channels = {
+        **{name: Channel(image.rgba[order, index], is_half=True) for index, name in enumerate("RGBA")},
+        "Z": Channel(image.enter[order]),
+        "ZBack": Channel(image.leave[order]),
+        **{f"N.{axis}": Channel(image.normal[order, index]) for index, axis in enumerate("XYZ")},
     }
-    channels = {name: np.ascontiguousarray(values) for name, values in columns.items()}
     return ExrContent((ExrPart(_attributes(image.camera, options), channels, counts),))
 
 
@@ -198,9 +225,7 @@ def _camera_attributes(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _pass_channels(image_pass: Pass, values: npt.NDArray[np.float32]) -> dict[str, npt.NDArray[Any]]:
+def _pass_channels(image_pass: Pass, values: npt.NDArray[np.float32]) -> dict[str, Channel]:
     """The channels of one pass by their last names, top row first."""
     planes = values.reshape(*values.shape[:2], len(image_pass.channels))[::-1]
-    if image_pass.is_color:
-        planes = np.clip(planes, -HALF_MAX, HALF_MAX).astype(np.float16)
-    return {channel: planes[..., index] for index, channel in enumerate(image_pass.channels)}
+    return {name: Channel(planes[..., index], image_pass.is_color) for index, name in enumerate(image_pass.channels)}

@@ -22,6 +22,11 @@ from .exr_child import read_answer, send_request
 from .exr_content import ExrContent
 from .whole_file import temporary_path
 
+try:
+    import fcntl
+except ImportError:  # Windows has none.
+    fcntl = None  # type: ignore[assignment]
+
 MAX_IN_FLIGHT = 2
 """Images that may be under way at a time; :meth:`ExrProcess.write` waits before it takes a third, to bound the memory."""
 
@@ -105,6 +110,7 @@ class _Child:
         except OSError as error:
             raise OutputError(f"The process that writes EXR files cannot be started: {error}") from error
         self._requests = cast(IO[bytes], self._process.stdin)
+        _widen(self._requests)
         self._answers = cast(IO[bytes], self._process.stdout)
 
     def write(self, path: Path, content: ExrContent) -> bool:
@@ -129,6 +135,13 @@ class _Child:
             self._requests.close()
         self._answers.close()
         return self._process.wait()
+
+
+def _widen(pipe: IO[bytes]) -> None:
+    """Linux gives pipes 64 KB: two processes then take turns thousands of times for an image, a third of what sending takes."""
+    if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
+        with contextlib.suppress(OSError):  # The user may have used up what pipes may have.
+            fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, 2**20)
 
 
 def _block_broken_pipe_signal() -> None:
