@@ -94,27 +94,48 @@ def write_deep_exr(
     write_content(path, deep_content(image, options))
 
 
-def write_content(path: str | os.PathLike[str], content: ExrContent) -> None:
+class EncodingMemory(io.BytesIO):
+    """Where a file is encoded; used again for the next file, it needs no fresh memory from the system."""
+
+    _end = 0
+
+    def write(self, data: Any, /) -> int:
+        """Put `data` where the encoder is, which goes back to the head in the end."""
+        count = super().write(data)
+        self._end = max(self._end, self.tell())
+        return count
+
+    def restart(self) -> None:
+        """Begin another file."""
+        self.seek(0)
+        self._end = 0
+
+    def file(self) -> memoryview:
+        """All bytes of the file; release it before the next."""
+        return self.getbuffer()[: self._end]
+
+
+def write_content(path: str | os.PathLike[str], content: ExrContent, memory: EncodingMemory | None = None) -> None:
     """Write `content` to `path` through a temporary file, see :func:`write_exr`."""
-    encoded = _encoded(content)
-    with whole_file(path) as temporary:
+    memory = memory or EncodingMemory()
+    memory.restart()
+    _encode(content, memory)
+    with whole_file(path) as temporary, memory.file() as encoded:
         temporary.write_bytes(encoded)
 
 
-def _encoded(content: ExrContent) -> bytes:
+def _encode(content: ExrContent, memory: EncodingMemory) -> None:
     try:
         import OpenEXR
     except ImportError as error:
         raise OutputError(f"The OpenEXR package cannot be loaded ({error}); install the extension again") from error
     if OpenEXR.global_thread_count() == 0:  # Nobody chose a number; compressing takes longest.
         OpenEXR.set_global_thread_count(os.cpu_count() or 1)
-    stream = io.BytesIO()
     try:
         with _file(content) as file:
-            file.write(stream)
+            file.write(memory)
     except (RuntimeError, ValueError, TypeError) as error:
         raise OutputError(f"The image cannot be encoded as EXR: {error}") from error
-    return stream.getvalue()
 
 
 def _file(content: ExrContent) -> Any:

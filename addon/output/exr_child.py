@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.errors import FullDiskError, MeniscusError, OutputError
-from .exr import write_content
+from .exr import EncodingMemory, write_content
 from .exr_content import Channel, ExrContent, ExrPart
 
 
@@ -69,9 +69,10 @@ def serve() -> None:
     # An exit by exception, so that a temporary file is removed.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     requests = _Requests(os.fdopen(sys.stdin.fileno(), "rb", closefd=False))
+    memory = EncodingMemory()
     with _private_stdout() as answers:
         for path, content in requests:
-            answers.write(json.dumps(_answer(path, content)).encode() + b"\n")
+            answers.write(json.dumps(_answer(path, content, memory)).encode() + b"\n")
             answers.flush()
 
 
@@ -82,9 +83,9 @@ def _private_stdout() -> BufferedWriter:
     return answers
 
 
-def _answer(path: str, content: ExrContent) -> tuple[str, str]:
+def _answer(path: str, content: ExrContent, memory: EncodingMemory) -> tuple[str, str]:
     try:
-        write_content(path, content)
+        write_content(path, content, memory)
     except MeniscusError as error:
         return type(error).__name__, str(error)
     return "", ""
@@ -98,7 +99,7 @@ class _Requests:
 
     def __init__(self, stream: BufferedReader) -> None:
         self._stream = stream
-        self._memory = np.empty(0, np.uint8)
+        self._memory: npt.NDArray[np.uint8] = np.empty(0, np.uint8)
 
     def __iter__(self) -> Iterator[tuple[str, ExrContent]]:
         while line := self._stream.readline():

@@ -151,9 +151,7 @@ def flat_content(image: ImageBuffers, options: ExrOptions = ExrOptions()) -> Exr
         for name, layer in image.cryptomatte.layers.items():
             planes = map(Channel, np.moveaxis(layer[::-1], 2, 0))
             images[f"{options.view_layer}.{name}"] = dict(zip("rgba", planes, strict=True))
-    parts = {
-        name: {f"{name}.{last}": channel for last, channel in channels.items()} for name, channels in images.items()
-    }
+    parts = {name: {f"{name}.{last}": channel for last, channel in channels.items()} for name, channels in images.items()}
     if options.is_multipart:
         return ExrContent(tuple(ExrPart({**attributes, "name": name}, channels) for name, channels in parts.items()))
     return ExrContent((ExrPart(attributes, {name: values for part in parts.values() for name, values in part.items()}),))
