@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -110,9 +111,10 @@ class EncodingMemory(io.BytesIO):
         self.seek(0)
         self._end = 0
 
-    def file(self) -> memoryview:
-        """All bytes of the file; release it before the next."""
-        return self.getbuffer()[: self._end]
+    def save(self, path: Path) -> None:
+        """Write what was encoded to `path`."""
+        with path.open("wb") as file, self.getbuffer() as memory, memory[: self._end] as encoded:
+            file.write(encoded)
 
 
 def write_content(path: str | os.PathLike[str], content: ExrContent, memory: EncodingMemory | None = None) -> None:
@@ -120,8 +122,8 @@ def write_content(path: str | os.PathLike[str], content: ExrContent, memory: Enc
     memory = memory or EncodingMemory()
     memory.restart()
     _encode(content, memory)
-    with whole_file(path) as temporary, memory.file() as encoded:
-        temporary.write_bytes(encoded)
+    with whole_file(path) as temporary:
+        memory.save(temporary)
 
 
 def _encode(content: ExrContent, memory: EncodingMemory) -> None:

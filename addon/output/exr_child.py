@@ -22,6 +22,9 @@ from ..fluid.errors import FullDiskError, MeniscusError, OutputError
 from .exr import EncodingMemory, write_content
 from .exr_content import Channel, ExrContent, ExrPart
 
+_NICENESS = 10
+"""The next frame goes before files; it has to wait for them only where :data:`exr_process.MAX_IN_FLIGHT` are under way."""
+
 
 def send_request(stream: IO[bytes], path: str, content: ExrContent) -> None:
     """The parent's side: ask for `content` to be written to `path`."""
@@ -64,6 +67,8 @@ def read_answer(stream: IO[bytes]) -> bool:
 
 def serve() -> None:
     """The child's side: answer requests until the parent closes the pipe."""
+    if hasattr(os, "nice"):  # On Windows the parent starts it with a low priority.
+        os.nice(_NICENESS)
     # Ctrl-C reaches the whole process group, but the parent decides when to stop: a file that was begun is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # An exit by exception, so that a temporary file is removed.

@@ -70,10 +70,11 @@ class Channel:
 
     def pixels(self) -> npt.NDArray[Any]:
         """What the file holds, row after row; half floats are clamped to their range."""
-        values = self.values
-        if values.dtype != self.dtype:
-            return np.clip(values, -HALF_MAX, HALF_MAX).astype(self.dtype, order="C")
-        return np.ascontiguousarray(values)
+        if self.values.dtype == self.dtype:
+            return np.ascontiguousarray(self.values)
+        pixels = np.array(self.values, order="C")
+        np.clip(pixels, -HALF_MAX, HALF_MAX, out=pixels)
+        return pixels.astype(self.dtype)
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ class _Child:
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                creationflags=_creation_flags("CREATE_NO_WINDOW", "BELOW_NORMAL_PRIORITY_CLASS"),
             )
         except OSError as error:
             raise OutputError(f"The process that writes EXR files cannot be started: {error}") from error
@@ -135,6 +135,11 @@ class _Child:
             self._requests.close()
         self._answers.close()
         return self._process.wait()
+
+
+def _creation_flags(*names: str) -> int:
+    """Those of Windows; 0 elsewhere."""
+    return sum(getattr(subprocess, name, 0) for name in names)
 
 
 def _widen(pipe: IO[bytes]) -> None:
