@@ -45,6 +45,21 @@ def test_the_child_writes_the_same_bytes_as_the_process_itself(tmp_path: Path) -
     assert (tmp_path / "there ü.exr").read_bytes() == (tmp_path / "here.exr").read_bytes()
 
 
+def test_a_small_image_after_a_large_one_leaves_nothing_of_it_in_the_file(tmp_path: Path) -> None:
+    write_exr(tmp_path / "here.exr", random_image())
+    with ExrProcess() as writer:
+        writer.write(tmp_path / "large.exr", flat_content(random_image(64, 48, seed=1))).result()
+        writer.write(tmp_path / "there.exr", flat_content(random_image())).result()
+    assert (tmp_path / "there.exr").read_bytes() == (tmp_path / "here.exr").read_bytes()
+
+
+@pytest.mark.skipif(not hasattr(os, "getpriority"), reason="Windows has no niceness")
+def test_the_child_yields_to_the_process_that_renders(tmp_path: Path) -> None:
+    with ExrProcess() as writer:
+        writer.write(tmp_path / "image.exr", flat_content(random_image())).result()
+        assert os.getpriority(os.PRIO_PROCESS, child_id(writer)) > os.getpriority(os.PRIO_PROCESS, 0)
+
+
 def test_the_child_imports_neither_blender_nor_opengl() -> None:
     probe = "; import sys as s; s.exit(len({'bpy', 'moderngl'} & set(s.modules)))"
     code = exr_process._BOOTSTRAP.replace("serve()\n", "pass" + probe)
