@@ -66,7 +66,7 @@ class ExrProcess:
         self.close()
 
     def write(self, path: str | os.PathLike[str], content: ExrContent) -> Future[float]:
-        """Begin to write a file, see :func:`exr.write_content`.
+        """Begin to write a file, see :func:`exr.write_content`; its arrays must stay as they are until that is done.
 
         Returns
         -------
