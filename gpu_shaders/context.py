@@ -12,6 +12,7 @@ import platform
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import partial
 from threading import Lock
 from typing import Any, TypeVar, cast
 
@@ -23,7 +24,7 @@ from .debug_output import DebugOutput
 from .driver_state import CONTEXT_LOST, DriverState
 from .limits import Limits
 from .programs import ProgramSource
-from .sharing import SharingContext, sharing_context
+from .sharing import VERSIONS, SharingContext, sharing_context
 
 Result = TypeVar("Result")
 Kept = TypeVar("Kept")
@@ -265,12 +266,20 @@ class GpuContext:
 
 
 def _standalone_glcontext() -> Any:
-    """glcontext's way to a standalone context: without a display on Linux."""
+    """glcontext's way to a standalone context, of the first version that there is: without a display on Linux."""
     if platform.system() == "Linux":
         # The names of the libraries as drivers install them; those without a number belong to developer packages.
-        egl = glcontext.get_backend_by_name("egl")
-        return egl(mode="standalone", libgl="libGL.so.1", libegl="libEGL.so.1", glversion=330)
-    return glcontext.default_backend()(mode="standalone", glversion=330)
+        make = partial(glcontext.get_backend_by_name("egl"), libgl="libGL.so.1", libegl="libEGL.so.1")
+    else:
+        make = glcontext.default_backend()
+    failure: Exception | None = None
+    for major, minor in VERSIONS:
+        try:
+            return make(mode="standalone", glversion=100 * major + 10 * minor)
+        # glcontext raises bare Exception for whatever the driver lacks.
+        except Exception as error:  # noqa: BLE001 - raised where no version is left
+            failure = error
+    raise failure or DeviceError("No version of OpenGL was asked for")
 
 
 _opening = Lock()

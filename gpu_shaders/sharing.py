@@ -19,7 +19,9 @@ from typing import Any
 
 from ..addon.fluid.errors import DeviceError
 
-_VERSION = 3, 3
+VERSIONS = (4, 3), (3, 3)
+"""Of OpenGL, as asked for in turn: some drivers give no more than that."""
+
 
 _POINTER, _XID, _UNSIGNED, _SIGNED = ctypes.c_void_p, ctypes.c_ulong, ctypes.c_uint, ctypes.c_int
 _ERROR_HANDLER = ctypes.CFUNCTYPE(_SIGNED, _POINTER, _POINTER)
@@ -132,12 +134,17 @@ class GlxContext(SharingContext):
 
     def _create(self, config: int, current: int) -> int:
         create_type = ctypes.CFUNCTYPE(_POINTER, _POINTER, _POINTER, _POINTER, _SIGNED, _POINTER)
-        attributes = (_SIGNED * 7)(
-            *(_GLX_CONTEXT_MAJOR_VERSION, _VERSION[0], _GLX_CONTEXT_MINOR_VERSION, _VERSION[1]),
-            *(_GLX_CONTEXT_PROFILE_MASK, _GLX_CONTEXT_CORE_PROFILE_BIT, 0),
-        )
         create = create_type(self.load("glXCreateContextAttribsARB") or 0)
-        return int(create(self._display, config, current, True, attributes) or 0)
+        for major, minor in VERSIONS:
+            attributes = (_SIGNED * 7)(
+                *(_GLX_CONTEXT_MAJOR_VERSION, major, _GLX_CONTEXT_MINOR_VERSION, minor),
+                *(_GLX_CONTEXT_PROFILE_MASK, _GLX_CONTEXT_CORE_PROFILE_BIT, 0),
+            )
+            with self._x_errors() as errors:
+                context = create(self._display, config, current, True, attributes)
+            if context and not errors:
+                return int(context)
+        return 0
 
     @contextmanager
     def _x_errors(self) -> Iterator[list[object]]:
@@ -194,11 +201,15 @@ class EglContext(SharingContext):
         if b"EGL_KHR_surfaceless_context" not in (extensions or b""):
             raise DeviceError("The graphics driver gives no context without a window to share textures with Blender's")
         create = _function(library, "eglCreateContext", _POINTER, *[_POINTER] * 4)
-        attributes = (_SIGNED * 7)(
-            *(_EGL_CONTEXT_MAJOR_VERSION, _VERSION[0], _EGL_CONTEXT_MINOR_VERSION, _VERSION[1]),
-            *(_EGL_CONTEXT_PROFILE_MASK, _EGL_CONTEXT_CORE_PROFILE_BIT, _EGL_NONE),
-        )
-        self._context = create(self._display, self._config(library, current), current, attributes)
+        config = self._config(library, current)
+        for major, minor in VERSIONS:
+            attributes = (_SIGNED * 7)(
+                *(_EGL_CONTEXT_MAJOR_VERSION, major, _EGL_CONTEXT_MINOR_VERSION, minor),
+                *(_EGL_CONTEXT_PROFILE_MASK, _EGL_CONTEXT_CORE_PROFILE_BIT, _EGL_NONE),
+            )
+            self._context = create(self._display, config, current, attributes)
+            if self._context:
+                break
         if not self._context:
             raise DeviceError("The graphics driver gives no context that shares textures with Blender's")
 

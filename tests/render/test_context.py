@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import platform
 from concurrent.futures import ThreadPoolExecutor
 
 import moderngl
@@ -97,6 +98,21 @@ def test_limits_are_those_of_the_driver_and_at_least_those_of_opengl_3_3(opengl)
     opengl.run(ask)
     assert opengl.limits.texture_size == integer.value >= 1024
     assert opengl.limits.draw_buffers >= 8
+
+
+@pytest.mark.skipif(platform.system() != "Linux", reason="elsewhere the window system gives the context")
+def test_the_newest_version_is_asked_for_first_and_3_3_after_it(monkeypatch):
+    asked = []
+
+    def give(**arguments):
+        asked.append(arguments["glversion"])
+        if asked[-1] > 330:
+            raise Exception("eglCreateContext failed (0x3009)")  # as glcontext does
+        return "a context"
+
+    monkeypatch.setattr(context_module.glcontext, "get_backend_by_name", lambda name: give)
+    assert context_module._standalone_glcontext() == "a context"
+    assert asked == [430, 330]
 
 
 def test_too_few_render_targets_are_one_sentence(opengl, pretend_limits):
