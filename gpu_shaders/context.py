@@ -12,6 +12,7 @@ import platform
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from functools import partial
 from threading import Lock
 from typing import Any, TypeVar, cast
@@ -272,14 +273,12 @@ def _standalone_glcontext() -> Any:
         make = partial(glcontext.get_backend_by_name("egl"), libgl="libGL.so.1", libegl="libEGL.so.1")
     else:
         make = glcontext.default_backend()
-    failure: Exception | None = None
-    for major, minor in VERSIONS:
-        try:
-            return make(mode="standalone", glversion=100 * major + 10 * minor)
+    *newer, oldest = (100 * major + 10 * minor for major, minor in VERSIONS)
+    for version in newer:
         # glcontext raises bare Exception for whatever the driver lacks.
-        except Exception as error:  # noqa: BLE001 - raised where no version is left
-            failure = error
-    raise failure or DeviceError("No version of OpenGL was asked for")
+        with suppress(Exception):
+            return make(mode="standalone", glversion=version)
+    return make(mode="standalone", glversion=oldest)
 
 
 _opening = Lock()

@@ -37,6 +37,8 @@ class Balls:
     ----------
     bounds
         (2, 3) float64: the least and the greatest corner of the box around all influence spheres; zeros where there is none.
+    weight
+        That of all balls; None where they differ, or there is none.
     fastest
         The greatest speed, Blender units a second; 0 where unknown.
     dropped
@@ -98,6 +100,10 @@ class Balls:
             return np.zeros((2, 3))
         radii = self.radii[:, None]
         return np.array([(self.positions - radii).min(axis=0), (self.positions + radii).max(axis=0)], np.float64)
+
+    @cached_property
+    def weight(self) -> float | None:
+        return float(self.weights[0]) if len(self) and np.all(self.weights == self.weights[0]) else None
 
     @cached_property
     def fastest(self) -> float:

@@ -22,11 +22,6 @@ from .exr_child import read_answer, send_request
 from .exr_content import ExrContent
 from .whole_file import temporary_path
 
-try:
-    import fcntl
-except ImportError:  # Windows has none.
-    fcntl = None  # type: ignore[assignment]
-
 MAX_IN_FLIGHT = 2
 """Images that may be under way at a time; :meth:`ExrProcess.write` waits before it takes a third, to bound the memory."""
 
@@ -144,7 +139,9 @@ def _creation_flags(*names: str) -> int:
 
 def _widen(pipe: IO[bytes]) -> None:
     """Linux gives pipes 64 KB: two processes then take turns thousands of times for an image, a third of what sending takes."""
-    if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
+    if sys.platform == "linux":
+        import fcntl
+
         with contextlib.suppress(OSError):  # The user may have used up what pipes may have.
             fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, 2**20)
 

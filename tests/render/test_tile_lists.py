@@ -66,6 +66,16 @@ def test_balls_that_do_not_fit_are_searched_slab_by_slab(use, make, projection):
     judge(image_of(scene, camera), scene, camera)
 
 
+def test_a_slab_of_equal_weights_among_others(use):
+    """Weights that differ only from the near to the far half."""
+    scene = SCENES["random_5000"]()
+    weights = np.where(scene.balls.positions[:, 1] < 0, 0.4, 1.0)
+    scene = replace(scene, balls=meniscus.Balls(scene.balls.positions, scene.balls.radii, weights))
+    camera = scene.camera("orthographic")
+    use(most_balls=2000)
+    judge(image_of(scene, camera), scene, camera)
+
+
 def test_lists_that_do_not_fit_make_slabs_thinner(pretend_limits, use):
     scene = SCENES["random_5000"]()
     use()

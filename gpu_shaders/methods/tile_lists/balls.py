@@ -38,13 +38,13 @@ class BallBuffers:
         What was uploaded.
     buffers
         By binding point.
-    weight
-        That of all balls; None where they differ.
+    greatest_weight
+        Of all balls.
     """
 
     balls: Balls
     buffers: dict[int, moderngl.Buffer]
-    weight: float | None
+    greatest_weight: float
 
     @classmethod
     def upload(
@@ -52,15 +52,17 @@ class BallBuffers:
         storage: Storage,
         balls: Balls,
         attributes: frozenset[Attribute],
-        indices: npt.NDArray[np.int64] | None,
+        with_weights: bool,
+        indices: npt.NDArray[np.int64] | None = None,
     ) -> BallBuffers:
-        """Upload what is needed to find the attributes; `indices` are the balls' numbers where they are only some."""
-        weight = float(balls.weights[0])
-        is_same = bool(np.all(balls.weights == balls.weights[0]))
+        """Upload what is needed to find the attributes; `indices` are the balls' numbers where they are only some.
+
+        Some may have the same weight where all have not: `with_weights` says what the shaders read.
+        """
         arrays: dict[int, npt.NDArray[np.float32] | npt.NDArray[np.int32] | None] = {
             0: balls.positions,
             1: balls.radii,
-            2: None if is_same else balls.weights,
+            2: balls.weights if with_weights else None,
             13: balls.colors if "color" in attributes else None,
             14: balls.velocities if "velocity" in attributes else None,
         }
@@ -68,7 +70,7 @@ class BallBuffers:
             numbers = np.arange(len(balls)) if indices is None else indices
             arrays[15] = numbers.astype(np.int32)
         buffers = {binding: storage.of(array) for binding, array in arrays.items() if array is not None}
-        return cls(balls, buffers, weight if is_same else None)
+        return cls(balls, buffers, float(balls.weights.max()))
 
     def has(self, attributes: frozenset[Attribute]) -> bool:
         """Whether what the attributes need was uploaded."""

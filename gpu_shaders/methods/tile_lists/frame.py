@@ -52,11 +52,11 @@ class Frame:
 
     def find(self, balls: BallBuffers, slab: Slab, textures: SurfaceTextures) -> bool:
         """Fill the textures where the surface lies in the slab; False where its balls do not fit into the buffers at once."""
-        least = self._memory.storage.of(least_x(self._field, float(balls.balls.weights.max())))
+        least = self._memory.storage.of(least_x(self._field, balls.greatest_weight))
         self._set_uniforms(
             {
                 "ball_count": len(balls.balls),
-                "weight_of_all": balls.weight or 0.0,
+                "weight_of_all": balls.balls.weight or 0.0,
                 "slab": (slab.start, slab.end),
                 "goes_on": not slab.is_first,
             }
@@ -72,6 +72,8 @@ class Frame:
                 break
             if not self._memory.grow(seen, entries):
                 return False
+        else:
+            return False
         counts = {"balls_drawn": seen, "entries": entries, "longest_list": longest, "crowded_rays": crowded}
         textures.add_report(times.milliseconds, counts)
         return True

@@ -20,8 +20,6 @@ layout(std430, binding = 10) readonly buffer TileStarts {
     uint tile_starts[];
 };
 
-uniform uint entry_capacity;
-
 const float FAR = 3e38;
 
 float weight_of(uint place) {
@@ -52,8 +50,8 @@ float front_of(Stream stream) {
 void open_streams(ivec2 pixel) {
     for (int level = 0; level < TILE_LEVELS; level++) {
         int tile = tile_number(level, (pixel / CELL_SIZE) >> (1 + 3 * level));
-        streams[level].next = min(tile_starts[tile], entry_capacity);
-        streams[level].end = min(tile_starts[tile + 1], entry_capacity);
+        streams[level].next = tile_starts[tile];
+        streams[level].end = tile_starts[tile + 1];
         streams[level].front = front_of(streams[level]);
     }
 }

@@ -132,8 +132,7 @@ class TileLists:
         """Fill the textures: with all balls at once or, where they are too many, slab by slab from near to far."""
         balls, wanted = request.balls, frozenset(attributes)
         most = self._most_balls or self._storage.most(POSITION_BYTES)
-        with_weights = not np.all(balls.weights == balls.weights[0])
-        steps = self._steps_of(self._variant(request.field.density_kernel, with_weights, wanted))
+        steps = self._steps_of(self._variant(request.field.density_kernel, balls.weight is None, wanted))
         frame = Frame(self._context, steps, self._memory_for(camera), camera, request.field)
         if len(balls) <= most and frame.find(self._uploaded(balls, wanted), Slab(-FAR, FAR, balls), textures):
             return
@@ -155,7 +154,8 @@ class TileLists:
         textures.clear()
         for slab in slabs(request.balls, camera, most):
             request.watch(0.0)
-            buffers = BallBuffers.upload(self._storage, slab.balls, attributes, slab.indices)
+            with_weights = request.balls.weight is None
+            buffers = BallBuffers.upload(self._storage, slab.balls, attributes, with_weights, slab.indices)
             if not frame.find(buffers, slab, textures):
                 return False
         return True
@@ -164,7 +164,7 @@ class TileLists:
         """The balls' buffers, which stay while the same balls are asked for."""
         if self._balls is None or self._balls.balls is not balls or not self._balls.has(attributes):
             self._balls = None  # its memory may be needed
-            self._balls = BallBuffers.upload(self._storage, balls, attributes, None)
+            self._balls = BallBuffers.upload(self._storage, balls, attributes, balls.weight is None)
         return self._balls
 
     def _memory_for(self, camera: Camera) -> Memory:

@@ -12,14 +12,11 @@ layout(std430, binding = 10) readonly buffer TileStarts {
     uint tile_starts[];
 };
 
-uniform uint entry_capacity;
-
 bool comes_before(uvec2 one, uvec2 other) {
     return one.x < other.x || (one.x == other.x && seen[one.y].id < seen[other.y].id);
 }
 
 // Where a tile's list begins, and its length.
 uvec2 list_of(uint tile) {
-    uint start = min(tile_starts[tile], entry_capacity);
-    return uvec2(start, min(tile_starts[tile + 1u], entry_capacity) - start);
+    return uvec2(tile_starts[tile], tile_starts[tile + 1u] - tile_starts[tile]);
 }

@@ -12,6 +12,7 @@ layout(std430, binding = 10) writeonly buffer TileStarts {
 
 uniform uint list_count;
 uniform uint seen_capacity;
+uniform uint entry_capacity;
 
 const uint MOST_ENTRIES = 0x7fffffffu; // more than fit anywhere
 
@@ -36,20 +37,24 @@ void main() {
         barrier();
         sums[own] = min(sums[own] + before, MOST_ENTRIES);
     }
-    uint start = sums[own] - sum;
+    memoryBarrierShared();
+    barrier();
+    // Where not everything has room there are no lists: they would have holes. The counts tell how much is needed.
+    bool fits = sums[1023] <= entry_capacity && counts.seen_count <= seen_capacity;
+    uint start = fits ? sums[own] - sum : 0u;
     for (uint i = 0u; i < part_count; i++) {
         if (first + i < list_count) {
             uint count = tile_counts[first + i];
             tile_starts[first + i] = start;
             tile_counts[first + i] = start;
-            start += count;
+            start += fits ? count : 0u;
         }
     }
     atomicMax(counts.longest_list, longest);
     if (own == 1023u) {
-        tile_starts[list_count] = sums[own];
+        tile_starts[list_count] = fits ? sums[own] : 0u;
         counts.entry_count = sums[own];
-        uint group_count = (min(counts.seen_count, seen_capacity) + 127u) / 128u;
+        uint group_count = fits ? (counts.seen_count + 127u) / 128u : 0u;
         counts.fill_groups[0] = min(group_count, 32768u);
         counts.fill_groups[1] = (group_count + 32767u) / 32768u;
         counts.fill_groups[2] = 1u;
