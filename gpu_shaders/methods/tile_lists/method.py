@@ -196,10 +196,11 @@ def _wanted(request: Request) -> tuple[Attribute, ...]:
 def _background(camera: Camera, attributes: tuple[Attribute, ...]) -> Surface:
     """The surface of nothing, to be filled."""
     shape = camera.height, camera.width
-    normal, color, velocity = (
-        np.zeros((*shape, 3), np.float32) if name in ("normal", *attributes) else None
-        for name in ("normal", "color", "velocity")
-    )
-    assert normal is not None
-    ball = np.full(shape, -1, np.int32) if "ball" in attributes else None
-    return Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), normal, color, velocity, ball)
+    surface = Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32))
+    if "color" in attributes:
+        surface.color = np.zeros((*shape, 3), np.float32)
+    if "velocity" in attributes:
+        surface.velocity = np.zeros((*shape, 3), np.float32)
+    if "ball" in attributes:
+        surface.ball = np.full(shape, -1, np.int32)
+    return surface
