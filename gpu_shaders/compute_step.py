@@ -20,11 +20,16 @@ class ComputeStep:
         self._gl = context.gl
         self._shader = context.compute_shader(source)
         self._names = frozenset(self._shader)
+        if self._shader.extra is None:
+            self._shader.extra = {}
+        # What the program has; others may use it as well.
+        self._values: dict[str, object] = self._shader.extra
 
     def set_uniforms(self, values: Mapping[str, object]) -> None:
-        """Set those of `values` that the shader uses."""
+        """Set those of `values` that the shader uses and does not have yet."""
         for name in self._names & values.keys():
-            self._shader[name] = values[name]
+            if name not in self._values or self._values[name] != values[name]:
+                self._shader[name] = self._values[name] = values[name]
 
     def run(self, columns: int, rows: int = 1) -> None:
         """Run groups of threads; what they write can be read by the next step."""

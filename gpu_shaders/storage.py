@@ -48,6 +48,10 @@ class Storage:
             buffer.write(array)
         return buffer
 
+    def copy(self, source: moderngl.Buffer, target: moderngl.Buffer) -> None:
+        """Copy a buffer to one of the same size, on the graphics processor."""
+        self._context.gl.copy_buffer(target, source)
+
     def fill(self, buffer: moderngl.Buffer, value: int) -> None:
         """Set each unsigned integer of a buffer to a value, on the graphics processor."""
         self._bind(_GL_COPY_WRITE_BUFFER, buffer.glo)

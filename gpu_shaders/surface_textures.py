@@ -45,8 +45,6 @@ class SurfaceTextures:
     textures
         "depth" has one channel, vectors have four, of which the last says nothing, "ball" has whole numbers: see
         :class:`method.Surface`. Empty after the release.
-    framebuffer
-        Draws into them in this order.
     milliseconds, counts
         As in :class:`method.Surface`.
     """
@@ -58,7 +56,7 @@ class SurfaceTextures:
         self.textures: dict[str, moderngl.Texture] = {
             name: gl.texture(size, components, dtype=dtype) for name, (components, dtype) in formats.items()
         }
-        self.framebuffer: moderngl.Framebuffer | None = gl.framebuffer(list(self.textures.values()))
+        self._framebuffer: moderngl.Framebuffer | None = None
         self.milliseconds: dict[str, float] = {}
         self.counts: dict[str, int] = {}
         self._context = context
@@ -69,6 +67,13 @@ class SurfaceTextures:
     def passes(self) -> tuple[str, ...]:
         """See :meth:`method.DeviceSurface.passes`."""
         return tuple(self.textures)
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """Draws into the textures, in their order."""
+        if self._framebuffer is None:
+            self._framebuffer = self._context.gl.framebuffer(list(self.textures.values()))
+        return self._framebuffer
 
     def add_report(self, milliseconds: dict[str, float], counts: dict[str, int]) -> None:
         """Add times and counts to those that are there."""
@@ -119,7 +124,7 @@ class SurfaceTextures:
 
     def release(self) -> None:
         """Give the textures back; what was copied stays."""
-        self.textures, self.framebuffer = {}, None
+        self.textures, self._framebuffer = {}, None
         self._context.collect()
 
 

@@ -23,7 +23,9 @@ from meniscus.addon.render.registry import create_method, gpu, method_infos
 from . import machine, report
 from .scenes import CROSSINGS, three_quarter_camera
 
-REPEATS = 3
+REPEATS = 5
+WARM_UP = 0.5
+"""Seconds of rendering before what counts on a graphics processor, which needs some to raise its clock."""
 COPIED_BYTES = 1 << 26
 COPIES = 8
 
@@ -109,12 +111,21 @@ def measure(case: Case, balls: meniscus.Balls, method: str) -> dict[str, Any]:
     """Render a case several times: the median of the whole, and the stages of the run that took the median."""
     row: dict[str, Any] = {"axis": case.axis, "value": value_of(case), "method": method, "milliseconds": None}
     try:
-        runs = [find(case, balls, method) for _ in range(1 + REPEATS)][1:]
+        warm_up(case, balls, method)
+        runs = [find(case, balls, method) for _ in range(REPEATS)]
     except MeniscusError as error:
         return row | {"error": str(error)}
     middle = statistics.median_low(run[0] for run in runs)
     _, stages, counts = next(run for run in runs if run[0] == middle)
     return row | {"milliseconds": middle, "stages": stages, "counts": counts, "balls": case.count, "size": case.size}
+
+
+def warm_up(case: Case, balls: meniscus.Balls, method: str) -> None:
+    """Render at least once."""
+    end = time.perf_counter() + WARM_UP
+    find(case, balls, method)
+    while create_method(method)[0].backend == "gpu" and time.perf_counter() < end:
+        find(case, balls, method)
 
 
 def find(case: Case, balls: meniscus.Balls, method: str) -> tuple[float, dict[str, float], dict[str, int]]:

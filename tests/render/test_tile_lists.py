@@ -12,7 +12,8 @@ from scenes import SCENES, Scene
 
 import meniscus
 from meniscus.addon.fluid.errors import DeviceError
-from meniscus.gpu_shaders.methods.tile_lists import memory, method
+from meniscus.gpu_shaders.context import GpuContext
+from meniscus.gpu_shaders.methods.tile_lists import memory, method, programs
 
 EXACT = ("random_5000", "lattice_with_droplets", "eye_inside_fluid", "crowded_corner", "negative_weights", "kernel_power_1")
 
@@ -79,10 +80,10 @@ def test_a_slab_of_equal_weights_among_others(use):
 def test_lists_that_do_not_fit_make_slabs_thinner(pretend_limits, use):
     scene = SCENES["random_5000"]()
     use()
-    pretend_limits(storage_block_bytes=32 * 2000)
+    pretend_limits(storage_block_bytes=32 * 4000)
     camera = scene.camera("perspective")
     image = image_of(scene, camera)
-    assert image.info.counts["entries"] > 32 * 2000 / 8
+    assert image.info.counts["entries"] > 32 * 4000 / 8
     judge(image, scene, camera)
 
 
@@ -164,19 +165,20 @@ def test_after_an_error_the_next_image_is_right(monkeypatch, opengl, use):
 
 
 def test_lists_of_any_length_are_sorted_alike(monkeypatch, use):
-    """Lists of a few, some hundred and some thousand entries, sorted by single threads and by groups."""
+    """Lists of a few, some hundred and some thousand entries, sorted by single threads and by groups of several sizes."""
     random = np.random.default_rng(5)
-    column = random.random((3000, 3)) * (0.05, 4, 0.05) + (0.4, -2, 0)
+    column = random.random((13000, 3)) * (0.01, 4, 0.01) + (0.4, -2, 0)
     spread = random.random((2000, 3)) * 2 - 1
-    weights = np.repeat([0.004, 0.3], [3000, 2000])
-    scene = Scene(meniscus.Balls(np.concatenate([column, spread]), np.repeat([0.2, 0.15], [3000, 2000]), weights))
+    weights = np.repeat([0.0009, 0.3], [13000, 2000])
+    scene = Scene(meniscus.Balls(np.concatenate([column, spread]), np.repeat([0.2, 0.15], [13000, 2000]), weights))
     camera = scene.camera("perspective")
     images = []
-    for short_list in (512, 1):
-        monkeypatch.setattr(method, "SOFTWARE_SHORT_LIST", short_list)
+    for is_software in (True, False):
+        monkeypatch.setattr(GpuContext, "is_software", is_software)
         use()
         images.append(image_of(scene, camera))
-    assert images[0].info.counts["longest_list"] > 1024
+    # More than twice what a group has room for.
+    assert images[0].info.counts["longest_list"] > 2 << programs.LONGEST_STAGES
     assert_equal(*images)
 
 

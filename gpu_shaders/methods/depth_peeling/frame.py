@@ -270,7 +270,6 @@ class Frame:
 
     def _finish(self, output: SurfaceTextures, corner: tuple[int, int]) -> None:
         """Write the surface into its place."""
-        assert output.framebuffer is not None
         output.framebuffer.viewport = (*corner, *self._targets.size)
         self._steps["finish"].set_uniforms({"part_corner": tuple(map(float, corner))})
         sums = self._targets.sums

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -77,6 +78,7 @@ class BallBuffers:
         return all(_BINDINGS[name] in self.buffers for name in attributes)
 
 
+@lru_cache
 def kernel_shares(field: Field) -> npt.NDArray[np.float32]:
     """(KERNEL_SHARES + 1,) kernel radii as shares of influence radii: the least of those of all weights in a part of
     ``isovalue / weight`` from 0 to 1, of which the last has none.
@@ -86,6 +88,7 @@ def kernel_shares(field: Field) -> npt.NDArray[np.float32]:
     return np.append(shares, 0).astype(np.float32)
 
 
+@lru_cache
 def least_x(field: Field, greatest_weight: float) -> npt.NDArray[np.float32]:
     """(33,) by their number n: of n balls that together reach the isovalue one must have at least this x; 0 for more."""
     counts = np.maximum(np.arange(_COUNTS), 1)

@@ -1,7 +1,8 @@
-// Casts the ray of each pixel: a group of threads for each tile of 8 x 8 pixels, in squares of 4 x 4.
+// Casts the ray of each pixel: a group of threads for 8 x 4 pixels, in squares of 4 x 4. Larger groups would hold their memory until
+// the slowest ray is done.
 #include "methods/tile_lists/crowd.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 32) in;
 
 layout(r32f, binding = 0) uniform image2D depth_image;
 layout(rgba32f, binding = 1) uniform image2D normal_image; // w: -1 where a ray that goes on is inside the fluid
@@ -40,18 +41,18 @@ struct Shade {
     int ball;
 };
 
-void add_shade(inout Shade shade, Ray ray, vec3 direction, uint place, float t) {
+void add_shade(inout Shade shade, vec3 direction, uint place, float t) {
     vec4 sphere = seen[place].sphere;
     Ball ball = Ball(sphere.xyz, sphere.w);
-    Chord chord = ball_chord(ball, ray);
+    Chord chord = ball_chord(ball, own_ray);
     float from_middle = (t - chord.middle) / chord.radius;
     float x = chord.peak - from_middle * from_middle;
     if (x <= 0.0)
         return;
     float weight = weight_of(place);
     // From the centre to the middle of the chord, then along the chord: nothing large is subtracted.
-    vec2 offset = ball_offset(ball, ray);
-    vec3 to_middle = direction * (dot(offset, ray.slope) / ray.stretch) - vec3(offset, 0.0);
+    vec2 offset = ball_offset(ball, own_ray);
+    vec3 to_middle = direction * (dot(offset, own_ray.slope) / own_ray.stretch) - vec3(offset, 0.0);
     shade.outward += weight * kernel_derivative(x) / chord.radius * (to_middle / chord.radius + direction * from_middle);
     float share = max(weight * kernel_value(x), 0.0);
     uint id = seen[place].id;
@@ -70,11 +71,11 @@ void add_shade(inout Shade shade, Ray ray, vec3 direction, uint place, float t) 
     }
 }
 
-Shade shade_at(Ray ray, vec3 direction, float t, bool is_crowded) {
+Shade shade_at(vec3 direction, float t, bool is_crowded) {
     Shade shade = Shade(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, -1);
     if (!is_crowded) {
         for (uint i = 0u; i < min(listed_count, uint(LIST_LENGTH)); i++)
-            add_shade(shade, ray, direction, places[i], t);
+            add_shade(shade, direction, listed[i], t);
         return shade;
     }
     for (int level = 0; level < TILE_LEVELS; level++) {
@@ -82,19 +83,19 @@ Shade shade_at(Ray ray, vec3 direction, float t, bool is_crowded) {
         for (uint entry = crowd_starts[level]; entry < entry_count; entry++) {
             if (key_distance(entries[entry].x) > t)
                 break;
-            add_shade(shade, ray, direction, entries[entry].y, t);
+            add_shade(shade, direction, entries[entry].y, t);
         }
     }
     return shade;
 }
 
 // Goes along a ray to the surface; true where there is one before `end`, then `t` is there.
-bool cast_ray(Ray ray, inout float t, float end, out bool is_crowded) {
+bool cast_ray(inout float t, float end, out bool is_crowded) {
     is_crowded = false;
     for (int level = 0; level < TILE_LEVELS; level++)
         crowd_starts[level] = streams[level].next;
-    take_in(ray, t, 0u);
-    float density = next_front() < t ? crowd_at(ray, t, 0.0).density : density_at(t).x;
+    take_in(t, 0u);
+    float density = next_front() < t ? crowd_at(t, 0.0).density : density_at(t).x;
     if (!goes_on && density > isovalue)
         side = -1.0;
     drop_before(t);
@@ -107,11 +108,11 @@ bool cast_ray(Ray ray, inout float t, float end, out bool is_crowded) {
         }
         // Beyond `t` also where the radius is lost in its rounding: the next ball must be taken in.
         float limit = front == FAR ? t : t + max(0.5 * seen[next_place()].sphere.w, abs(t) * EPSILON);
-        take_in(ray, limit, 2u);
+        take_in(limit, 2u);
         front = next_front();
         if (listed_count == uint(LIST_LENGTH) && front <= t) {
             is_crowded = true;
-            return walk_in_crowd(ray, t, end);
+            return walk_in_crowd(t, end);
         }
         float horizon = min(min(front, max(bounds.last_exit, limit)), end);
         if (listed_count > 0u && (side < 0.0 || bounds.density >= isovalue)) {
@@ -143,30 +144,30 @@ void put(ivec2 pixel, float depth, vec3 normal, Shade shade) {
 
 void main() {
     uint own = gl_LocalInvocationIndex;
-    ivec2 inside = ivec2((own & 3u) | (own >> 2u & 4u), (own >> 2u & 3u) | (own >> 3u & 4u));
-    ivec2 pixel = ivec2(gl_WorkGroupID.xy) * 8 + inside;
-    if (any(greaterThanEqual(pixel, image_size)))
+    ivec2 inside = ivec2((own & 3u) | (own >> 2u & 4u), own >> 2u & 3u);
+    ivec2 pixel = ivec2(gl_WorkGroupID.xy) * ivec2(8, 4) + inside;
+    if (any(greaterThanEqual(pixel, image_size)) || !lists_fit())
         return;
     if (goes_on) {
         if (imageLoad(depth_image, pixel).x < DEPTH_BACKGROUND)
             return;
         side = imageLoad(normal_image, pixel).w;
     }
-    Ray ray = ray_from_pixel(vec2(pixel) + 0.5);
-    vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
+    take_ray(vec2(pixel) + 0.5);
+    vec3 direction = vec3(own_ray.slope, -1.0) / own_ray.stretch;
     visible_end = uintBitsToFloat(occlusion[occlusion_index(0, pixel / CELL_SIZE)]);
     open_streams(pixel);
-    float t = max(clip_distances.x * ray.stretch, slab.x), end = min(clip_distances.y * ray.stretch, slab.y);
+    float t = max(clip_distances.x * own_ray.stretch, slab.x), end = min(clip_distances.y * own_ray.stretch, slab.y);
     bool is_crowded = false;
     Shade shade = Shade(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, -1);
-    if (!cast_ray(ray, t, end, is_crowded)) {
+    if (!cast_ray(t, end, is_crowded)) {
         put(pixel, DEPTH_BACKGROUND, vec3(0.0), shade);
     } else {
-        shade = shade_at(ray, direction, t, is_crowded);
+        shade = shade_at(direction, t, is_crowded);
         float steepness = length(shade.outward);
         // Where the density is level, which has no normal, the one that faces along the ray.
         vec3 normal = steepness > 0.0 ? shade.outward / steepness : -side * direction;
-        put(pixel, min(t / ray.stretch, DEPTH_BACKGROUND), world_from_view * normal, shade);
+        put(pixel, min(t / own_ray.stretch, DEPTH_BACKGROUND), world_from_view * normal, shade);
     }
     if (is_crowded)
         atomicAdd(counts.crowded_count, 1u);

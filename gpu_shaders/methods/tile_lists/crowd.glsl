@@ -37,7 +37,7 @@ void add_to_crowd(inout Crowd crowd, Chord chord, float weight, float t, float w
     crowd.slope += slope;
 }
 
-Crowd crowd_at(Ray ray, float t, float window) {
+Crowd crowd_at(float t, float window) {
     Crowd crowd = Crowd(0.0, 0.0, 0.0, FAR);
     for (int level = 0; level < TILE_LEVELS; level++) {
         bool is_start = true;
@@ -57,18 +57,18 @@ Crowd crowd_at(Ray ray, float t, float window) {
             if (is_start)
                 crowd_starts[level] = entry + 1u;
             else if (!has_ended)
-                add_to_crowd(crowd, ball_chord(ball, ray), side * weight_of(next.y), t, t + window);
+                add_to_crowd(crowd, ball_chord(ball, own_ray), side * weight_of(next.y), t, t + window);
         }
     }
     return crowd;
 }
 
 // Walks from `t` to `end`; true where the surface is met, then `t` is there.
-bool walk_in_crowd(Ray ray, inout float t, float end) {
+bool walk_in_crowd(inout float t, float end) {
     float window = seen[next_place()].sphere.w;
     for (uint i = 0u; i < MOST_STEPS && t < end; i++) {
         float resolution = max(abs(t) * 3e-7, TINY);
-        Crowd crowd = crowd_at(ray, t, window);
+        Crowd crowd = crowd_at(t, window);
         float gap = side * isovalue - crowd.density;
         if (gap <= 0.0)
             return true;

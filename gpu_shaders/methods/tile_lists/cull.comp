@@ -11,35 +11,29 @@ layout(std430, binding = 8) writeonly buffer SeenBalls {
     Seen seen[];
 };
 layout(std430, binding = 9) buffer TileCounts {
-    uint tile_counts[];
+    uint tile_counts[]; // of entries
 };
 
-uniform uint seen_capacity;
 uniform vec2 clip_distances; // planar
 
 shared uint kept_count;
 shared uint first_place;
-
-int tile_level(ivec2 first, ivec2 last) {
-    ivec2 span = last - first;
-    int widest = max(span.x, span.y);
-    return widest < 2 * MOST_TILES_ACROSS ? 0 : widest < 16 * MOST_TILES_ACROSS ? 1 : 2;
-}
 
 // Counts the ball in its tiles; false where it cannot be seen.
 bool count_in_tiles(Ball ball, out Seen result) {
     vec4 rectangle = sphere_rectangle(ball.center, ball.radius);
     float depth = -ball.center.z;
     bool is_between = depth + ball.radius > clip_distances.x && depth - ball.radius < clip_distances.y;
-    if (!is_between || any(greaterThanEqual(rectangle.xy, rectangle.zw)))
+    // The pixels whose centres lie in the rectangle.
+    ivec2 first = ivec2(ceil(rectangle.xy - 0.5)), last = ivec2(floor(rectangle.zw - 0.5));
+    if (!is_between || any(lessThan(last, first)))
         return false;
-    ivec2 first = ivec2(rectangle.xy) / CELL_SIZE;
-    ivec2 last = min(ivec2(rectangle.zw) / CELL_SIZE, cells - 1);
     float front = sphere_nearest(ball.center, ball.radius);
-    if (front >= occlusion_farthest(first, last))
+    if (front >= occlusion_farthest(first / CELL_SIZE, last / CELL_SIZE))
         return false;
-    int level = tile_level(first, last);
-    ivec2 first_tile = first >> (1 + 3 * level), last_tile = last >> (1 + 3 * level);
+    ivec2 span = last - first;
+    int level = tile_level(max(span.x, span.y) + 1);
+    ivec2 first_tile = first >> TILE_SHIFTS[level], last_tile = last >> TILE_SHIFTS[level];
     bool is_seen = false;
     for (int y = first_tile.y; y <= min(last_tile.y, LARGEST_SIDE); y++) {
         for (int x = first_tile.x; x <= min(last_tile.x, LARGEST_SIDE); x++) {

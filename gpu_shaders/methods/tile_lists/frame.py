@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import moderngl
-import numpy as np
 
 from ....addon.fluid.camera import Camera
 from ....addon.fluid.field import Field
@@ -16,8 +15,8 @@ from ...compute_step import ComputeStep
 from ...context import GpuContext
 from ...surface_textures import SurfaceTextures
 from .balls import BallBuffers, kernel_shares, least_x
-from .memory import FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET, Memory
-from .programs import THREADS
+from .memory import FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET, LONGEST_GROUPS_OFFSET, Memory
+from .programs import TEAM, THREADS
 from .slabs import Slab
 
 _IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
@@ -66,7 +65,7 @@ class Frame:
             self._begin({**balls.buffers, 4: self._shares, 12: least})
             self._make_lists(len(balls.balls), times)
             self._cast(textures, times)
-            seen, entries, crowded, longest = np.frombuffer(self._memory.counts.read(16), np.uint32).tolist()
+            seen, entries, crowded, longest = self._memory.read_counts()
             if self._memory.holds(seen, entries):
                 self._memory.know(seen, len(balls.balls))
                 break
@@ -102,11 +101,15 @@ class Frame:
         with times.of("cull"):
             steps["cull"].run_in_lines(-(-count // THREADS))
         with times.of("bin"):
-            steps["scan"].run(1)
+            steps["allot"].run_in_lines(-(-memory.grid.tile_count // THREADS))
             steps["fill"].run_indirect(memory.counts, FILL_GROUPS_OFFSET)
         with times.of("sort"):
-            steps["sort_short"].run_in_lines(-(-memory.grid.tile_count // 64))
+            if "sort_serial" in steps:
+                steps["sort_serial"].run_in_lines(-(-memory.grid.tile_count // THREADS))
+            else:
+                steps["sort_short"].run_in_lines(-(-memory.grid.tile_count * TEAM // THREADS))
             steps["sort_long"].run_indirect(memory.counts, LONG_GROUPS_OFFSET)
+            steps["sort_longest"].run_indirect(memory.counts, LONGEST_GROUPS_OFFSET)
 
     def _occlude(self, step_size: int, count: int) -> None:
         """Draw `count` kernel spheres, see `step_size` of occlude.comp, and make the pyramid of what they hide."""
@@ -124,7 +127,7 @@ class Frame:
         for name, texture in textures.textures.items():
             texture.bind_to_image(_IMAGES[name], read=name in ("depth", "normal"), write=True)
         with times.of("cast"):
-            self._steps["cast"].run(-(-self._camera.width // 8), -(-self._camera.height // 8))
+            self._steps["cast"].run(-(-self._camera.width // 8), -(-self._camera.height // 4))
 
 
 class _Times:

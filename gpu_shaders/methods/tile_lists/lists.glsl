@@ -16,6 +16,9 @@ uniform float weight_of_all;
 layout(std430, binding = 8) readonly buffer SeenBalls {
     Seen seen[];
 };
+layout(std430, binding = 9) readonly buffer TileEnds {
+    uint tile_ends[];
+};
 layout(std430, binding = 10) readonly buffer TileStarts {
     uint tile_starts[];
 };
@@ -34,37 +37,44 @@ float weight_of(uint place) {
 struct Stream {
     uint next;
     uint end;
+    uint place;  // of the next ball
     float front; // of the next ball, FAR where there is none
 };
 
 Stream streams[TILE_LEVELS];
 float visible_end = FAR; // what begins behind this is hidden
 
-float front_of(Stream stream) {
+void look_ahead(inout Stream stream) {
+    stream.front = FAR;
     if (stream.next >= stream.end)
-        return FAR;
-    float front = key_distance(entries[stream.next].x);
-    return front < visible_end ? front : FAR;
+        return;
+    uvec2 entry = entries[stream.next];
+    float front = key_distance(entry.x);
+    stream.place = entry.y;
+    if (front < visible_end)
+        stream.front = front;
 }
 
 void open_streams(ivec2 pixel) {
     for (int level = 0; level < TILE_LEVELS; level++) {
-        int tile = tile_number(level, (pixel / CELL_SIZE) >> (1 + 3 * level));
+        int tile = tile_number(level, pixel >> TILE_SHIFTS[level]);
         streams[level].next = tile_starts[tile];
-        streams[level].end = tile_starts[tile + 1];
-        streams[level].front = front_of(streams[level]);
+        streams[level].end = tile_ends[tile];
+        look_ahead(streams[level]);
     }
 }
 
 float next_front() {
-    return min(streams[0].front, min(streams[1].front, streams[2].front));
+    return min(min(streams[0].front, streams[1].front), min(streams[2].front, streams[3].front));
 }
 
 // The place of the ball that begins next; there must be one.
 uint next_place() {
     float front = next_front();
-    uint entry = streams[0].front == front ? streams[0].next : streams[1].front == front ? streams[1].next : streams[2].next;
-    return entries[entry].y;
+    return streams[0].front == front   ? streams[0].place
+           : streams[1].front == front ? streams[1].place
+           : streams[2].front == front ? streams[2].place
+                                       : streams[3].place;
 }
 
 void skip_next() {
@@ -73,7 +83,7 @@ void skip_next() {
     for (int level = 0; level < TILE_LEVELS; level++) {
         if (!is_done && streams[level].front == front) {
             streams[level].next++;
-            streams[level].front = front_of(streams[level]);
+            look_ahead(streams[level]);
             is_done = true;
         }
     }
@@ -97,10 +107,21 @@ struct Listed {
     float weight;
 };
 
-Listed listed[LIST_LENGTH];
-uint places[LIST_LENGTH];
+// Only where the balls are: memory that a thread has for itself is slower than to find the chord again.
+uint listed[LIST_LENGTH];
 uint listed_count = 0u;
 Bounds bounds = NO_BOUNDS;
+Ray own_ray;
+
+void take_ray(vec2 pixel) {
+    own_ray = ray_from_pixel(pixel);
+}
+
+Listed ball_on_ray(uint place) {
+    vec4 sphere = seen[place].sphere;
+    Chord chord = ball_chord(Ball(sphere.xyz, sphere.w), own_ray);
+    return Listed(chord.peak, chord.middle, chord.radius, weight_of(place));
+}
 
 float half_chord(Listed ball) {
     return ball.radius * sqrt(max(ball.peak, 0.0));
@@ -117,20 +138,17 @@ void add_bounds(Listed ball) {
 }
 
 // Takes in the balls that begin before `limit`, and more until there are `least`; fewer where the list is full.
-void take_in(Ray ray, float limit, uint least) {
+void take_in(float limit, uint least) {
     for (uint i = 0u; i < MOST_ENTRIES; i++) {
         float front = next_front();
         if (front == FAR || (front >= limit && listed_count >= least) || listed_count == uint(LIST_LENGTH))
             return;
         uint place = next_place();
         skip_next();
-        vec4 sphere = seen[place].sphere;
-        Chord chord = ball_chord(Ball(sphere.xyz, sphere.w), ray);
-        if (chord.peak > 0.0) {
-            Listed ball = Listed(chord.peak, chord.middle, chord.radius, weight_of(place));
+        Listed ball = ball_on_ray(place);
+        if (ball.peak > 0.0) {
             add_bounds(ball);
-            listed[listed_count] = ball;
-            places[listed_count] = place;
+            listed[listed_count] = place;
             listed_count++;
         }
     }
@@ -141,11 +159,10 @@ void drop_before(float t) {
     uint kept_count = 0u;
     bounds = NO_BOUNDS;
     for (uint i = 0u; i < min(listed_count, uint(LIST_LENGTH)); i++) {
-        Listed ball = listed[i];
+        Listed ball = ball_on_ray(listed[i]);
         if (ball.middle + half_chord(ball) > t) {
             add_bounds(ball);
-            listed[kept_count] = ball;
-            places[kept_count] = places[i];
+            listed[kept_count] = listed[i];
             kept_count++;
         }
     }

@@ -9,13 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ...storage import Storage
-from .programs import CELL_SIZE, LARGE_OCCLUDERS, OCCLUSION_LEVELS
+from .programs import CELL_SIZE, LARGE_OCCLUDERS, OCCLUSION_LEVELS, TILE_SHIFTS
 
-TILE_LEVELS = 3
 SEEN_BYTES = 32
 ENTRY_BYTES = 8
-COUNT_BYTES = 48
-FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET = 16, 32
+COUNT_BYTES = 64
+FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET, LONGEST_GROUPS_OFFSET = 16, 32, 48
+_OVERFLOW = 11
+"""Which of the counts."""
+_TOO_MANY = 1 << 40
 _ROOM = 1.25
 """How much larger than needed buffers become, so that the next frame fits as well."""
 _LEAST_SEEN = 1 << 14
@@ -32,13 +34,14 @@ class Grid:
         Columns and rows of the finest cells.
     level_starts
         Where each level of the pyramid begins, and where the last one ends.
-    tile_starts
-        The same for the levels of tiles.
+    tile_starts, tile_columns
+        The same for the levels of tiles, and how many lie across.
     """
 
     cells: tuple[int, int]
     level_starts: tuple[int, ...]
     tile_starts: tuple[int, ...]
+    tile_columns: tuple[int, ...]
 
     @classmethod
     def of(cls, width: int, height: int) -> Grid:
@@ -46,8 +49,13 @@ class Grid:
         cells = -(-width // CELL_SIZE), -(-height // CELL_SIZE)
         levels = (max(cells) - 1).bit_length() + 1
         counts = [_cells_of_level(cells, level) for level in range(levels)]
-        tiles = [_cells_of_level(cells, 1 + 3 * level) for level in range(TILE_LEVELS)]
-        return cls(cells, tuple(np.cumsum([0, *counts]).tolist()), tuple(np.cumsum([0, *tiles]).tolist()))
+        tiles = [(-(-width // 2**shift), -(-height // 2**shift)) for shift in TILE_SHIFTS]
+        return cls(
+            cells,
+            tuple(np.cumsum([0, *counts]).tolist()),
+            tuple(np.cumsum([0, *(columns * rows for columns, rows in tiles)]).tolist()),
+            tuple(columns for columns, _ in tiles),
+        )
 
     @property
     def levels(self) -> int:
@@ -64,7 +72,8 @@ class Grid:
         block = np.zeros((1 + OCCLUSION_LEVELS, 4), np.int32)
         block[0, :3] = *self.cells, self.levels
         block[1 : 1 + self.levels, 0] = self.level_starts[:-1]
-        block[1 : 1 + TILE_LEVELS, 1] = self.tile_starts[:-1]
+        block[1 : 1 + len(TILE_SHIFTS), 1] = self.tile_starts[:-1]
+        block[1 : 1 + len(TILE_SHIFTS), 2] = self.tile_columns
         return block
 
 
@@ -92,9 +101,10 @@ class Memory:
             6: storage.reserve(4 * (4 + LARGE_OCCLUDERS)),
             7: storage.reserve(COUNT_BYTES),
             9: storage.reserve(4 * grid.tile_count),
-            10: storage.reserve(4 * (grid.tile_count + 1)),
+            10: storage.reserve(2 * 4 * grid.tile_count),
         }
         self._grid_block = storage.of(grid.block())
+        self._counts_read = storage.reserve(COUNT_BYTES)
         self._reserve(min(_LEAST_SEEN, storage.most(SEEN_BYTES)), min(_LEAST_ENTRIES, storage.most(ENTRY_BYTES)))
 
     def holds(self, seen: int, entries: int) -> bool:
@@ -133,6 +143,14 @@ class Memory:
         """The counts of the frame, see seen.glsl."""
         return self._buffers[7]
 
+    def read_counts(self) -> tuple[int, int, int, int]:
+        """Seen balls, entries, crowded rays and the longest list; waits for the frame."""
+        # From a copy: a buffer that is read may be moved to where the shaders' access is slow.
+        self.storage.copy(self.counts, self._counts_read)
+        counts = np.frombuffer(self._counts_read.read(), np.uint32).tolist()
+        seen, entries, crowded, longest = counts[:4]
+        return seen, _TOO_MANY if counts[_OVERFLOW] else entries, crowded, longest
+
     @property
     def large(self) -> moderngl.Buffer:
         """The large occluders, see large.glsl."""
@@ -149,4 +167,4 @@ class Memory:
 
     def forget_large(self) -> None:
         """Forget the large occluders."""
-        self.large.write(np.array([0, 1, 1, 0], np.uint32))
+        self.storage.fill(self.large, 0)

@@ -24,7 +24,7 @@ from .balls import POSITION_BYTES, BallBuffers
 from .frame import Frame
 from .memory import Memory
 from .params import METHOD
-from .programs import LIST_LENGTH, SHORT_LIST, SOFTWARE_SHORT_LIST, Variant
+from .programs import LIST_LENGTH, Variant
 from .slabs import FAR, Slab, slabs
 
 Result = TypeVar("Result")
@@ -53,7 +53,6 @@ class TileLists:
         context.require(METHOD.gl_version, storage_blocks=_STORAGE_BLOCKS)
         self._context = context
         self._list_length = list_length
-        self._short_list = SOFTWARE_SHORT_LIST if context.is_software else SHORT_LIST
         self._most_balls = most_balls
         self._storage = Storage(context)
         self._steps: dict[Variant, dict[str, ComputeStep]] = {}
@@ -174,7 +173,7 @@ class TileLists:
         return self._memory[size]
 
     def _variant(self, kernel: Kernel, with_weights: bool = False, attributes: frozenset[Attribute] = frozenset()) -> Variant:
-        return Variant(kernel, with_weights, attributes, self._list_length, self._short_list)
+        return Variant(kernel, with_weights, attributes, self._list_length, self._context.is_software)
 
     def _steps_of(self, variant: Variant) -> dict[str, ComputeStep]:
         if variant not in self._steps:

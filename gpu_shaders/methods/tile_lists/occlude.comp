@@ -24,6 +24,8 @@ bool is_hidden(Occluder occluder) {
 
 void main() {
     uint number = thread_number();
+    if (number == 0u)
+        large_groups[1] = large_groups[2] = 1u;
     if (number >= drawn_count)
         return;
     uint id = step_size == 0u ? min(seen[number].id, ball_count - 1u) : number * step_size;

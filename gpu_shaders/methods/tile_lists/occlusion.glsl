@@ -9,7 +9,7 @@ layout(std430, binding = 3) buffer Occlusion {
 layout(std140, binding = 0) uniform Grid {
     ivec2 cells; // across and up, of the finest level
     int level_count;
-    ivec4 level_starts[OCCLUSION_LEVELS]; // where each level lies, in x; where each level of tiles lies, in y
+    ivec4 level_starts[OCCLUSION_LEVELS]; // where each level lies, in x; where each level of tiles lies, in y, and its columns, in z
 };
 
 const uint HIDES_NOTHING = 0x7f800000u; // infinity

@@ -37,4 +37,15 @@ layout(std430, binding = 7) buffer Counts {
     uint fill_groups[3];
     uint long_count; // lists that groups of threads sort
     uint long_groups[3];
+    uint has_overflown; // the number of entries
+    uint longest_groups[3];
+    uint longest_count; // lists that large groups of threads sort
 } counts;
+
+uniform uint seen_capacity;
+uniform uint entry_capacity;
+
+// Whether there is room for everything; else there are no lists, as they would have holes.
+bool lists_fit() {
+    return counts.seen_count <= seen_capacity && counts.entry_count <= entry_capacity && counts.has_overflown == 0u;
+}

@@ -1,41 +1,26 @@
-// Sorts the short lists, a thread for each (Shell 1959), and gathers the tiles with long ones.
+// Sorts the short lists, a team of threads for each, by counting what comes before each entry.
 #define ENTRIES_ACCESS
 #include "methods/tile_lists/order.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = THREADS) in;
 
-uniform uint list_count;
-
-// Every `gap`th entry becomes sorted.
-void sort_with_gap(uint start, uint count, uint gap) {
-    for (uint i = gap; i < count; i++) {
-        uvec2 entry = entries[start + i];
-        uint place = i;
-        for (uint step = 0u; step < SHORT_LIST && place >= gap; step++) {
-            uvec2 before = entries[start + place - gap];
-            if (!comes_before(entry, before))
-                break;
-            entries[start + place] = before;
-            place -= gap;
-        }
-        entries[start + place] = entry;
-    }
-}
+shared uvec2 own_entries[THREADS / TEAM * SHORT_LIST];
 
 void main() {
-    uint tile = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationIndex;
-    if (tile >= list_count)
-        return;
-    uvec2 list = list_of(tile);
-    if (list.y > SHORT_LIST) {
-        uint number = atomicAdd(counts.long_count, 1u);
-        tile_counts[number] = tile;
-        atomicMax(counts.long_groups[0], min(number + 1u, 32768u));
-        atomicMax(counts.long_groups[1], number / 32768u + 1u);
-        return;
+    uint own = gl_LocalInvocationIndex;
+    uint number = own % TEAM, first = own / TEAM * SHORT_LIST;
+    uint tile = ((gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * uint(THREADS) + own) / TEAM;
+    uvec2 list = tile < list_count && lists_fit() ? list_of(tile) : uvec2(0u);
+    uint count = list.y <= SHORT_LIST ? list.y : 0u;
+    for (uint i = number; i < count; i += TEAM)
+        own_entries[first + i] = entries[list.x + i];
+    memoryBarrierShared();
+    barrier();
+    for (uint i = number; i < count; i += TEAM) {
+        uvec2 entry = own_entries[first + i];
+        uint before = 0u;
+        for (uint other = 0u; other < count; other++)
+            before += uint(other != i && comes_before(own_entries[first + other], entry));
+        entries[list.x + before] = entry;
     }
-    const uint gaps[6] = uint[6](132u, 57u, 23u, 10u, 4u, 1u); // Ciura 2001
-    for (int i = 0; i < 6; i++)
-        if (gaps[i] < list.y)
-            sort_with_gap(list.x, list.y, gaps[i]);
 }

@@ -30,7 +30,7 @@ float side = 1.0; // -1 for a ray that comes from inside the fluid
 vec2 density_at(float t) {
     vec2 sum = vec2(0.0);
     for (uint i = 0u; i < min(listed_count, uint(LIST_LENGTH)); i++) {
-        Listed ball = listed[i];
+        Listed ball = ball_on_ray(listed[i]);
         float offset = (t - ball.middle) / ball.radius;
         float x = ball.peak - offset * offset;
         if (x > 0.0)
@@ -45,7 +45,7 @@ float next_possible(float t, float horizon) {
     float threshold = least_x[min(listed_count, 32u)];
     float first = horizon;
     for (uint i = 0u; i < min(listed_count, uint(LIST_LENGTH)); i++) {
-        Listed ball = listed[i];
+        Listed ball = ball_on_ray(listed[i]);
         float reach_2 = ball.peak - threshold;
         if (reach_2 > 0.0) {
             float reach = ball.radius * sqrt(reach_2);
@@ -62,7 +62,7 @@ float next_possible(float t, float horizon) {
 vec2 kinks_ahead(float t) {
     vec2 kinks = vec2(FAR, 0.0);
     for (uint i = 0u; i < min(listed_count, uint(LIST_LENGTH)); i++) {
-        Listed ball = listed[i];
+        Listed ball = ball_on_ray(listed[i]);
         float half_length = half_chord(ball);
         float margin = (abs(t) + half_length) * KINK_MARGIN;
         float entry = ball.middle - half_length, exit = ball.middle + half_length;
