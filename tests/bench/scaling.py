@@ -21,7 +21,7 @@ from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method, gpu, method_infos
 
 from . import machine, report
-from .scenes import CROSSINGS, three_quarter_camera
+from .scenes import CROSSINGS, dense_balls, three_quarter_camera
 
 REPEATS = 5
 WARM_UP = 0.5
@@ -32,7 +32,7 @@ COPIES = 8
 
 @dataclass(frozen=True)
 class Case:
-    """What is rendered: balls spread evenly in a unit cube, of one radius.
+    """What is rendered: balls of one radius in a unit cube, evenly spread or nearly on a lattice.
 
     Attributes
     ----------
@@ -44,6 +44,8 @@ class Case:
         Width and height, pixels.
     kernel
         Of the density.
+    isovalue
+        That is the surface.
     """
 
     axis: str
@@ -51,17 +53,23 @@ class Case:
     crossings: float = CROSSINGS
     size: tuple[int, int] = (1920, 1080)
     kernel: str = "wyvill"
+    isovalue: float = 0.2
 
     @property
     def balls(self) -> meniscus.Balls:
         """The balls, the same each time."""
+        if self.axis == "dense":
+            return dense_balls(self.count)
         positions = np.random.default_rng(1).random((self.count, 3)).astype(np.float32)
         return meniscus.Balls(positions, np.sqrt(self.crossings / (np.pi * self.count)))
 
 
 def cases(most_balls: int, size: tuple[int, int]) -> Iterator[Case]:
     """All cases of the study."""
-    yield from (Case("balls", 10**power, size=size) for power in range(3, 8) if 10**power <= most_balls)
+    counts = [10**power for power in range(3, 8) if 10**power <= most_balls]
+    yield from (Case("balls", count, size=size) for count in counts)
+    yield from (Case("thin", count, size=size, isovalue=0.4) for count in counts if count >= 100_000)
+    yield from (Case("dense", count, size=size, isovalue=0.4) for count in counts if count >= 100_000)
     sizes = ((320, 240), (640, 480), (1280, 720), (1920, 1080), (3840, 2160))
     yield from (Case("resolution", size=other) for other in sizes if other[0] <= 2 * size[0])
     yield from (Case("density", crossings=crossings, size=size) for crossings in (2, 5, 10, 20, 40))
@@ -79,7 +87,8 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     about = machine.describe()
     print(about["warning"], flush=True)
-    about["gl_renderer"] = gpu().shared_context().renderer
+    context = gpu().shared_context()
+    about["gl_renderer"] = f"{context.renderer}, {context.gl.info['GL_VERSION']}"
     width, height = map(int, options.size.split("x"))
     rows = measured(list(cases(options.most_balls, (width, height))), options.methods, options.limit)
     bandwidth = copy_bandwidth()
@@ -132,7 +141,7 @@ def find(case: Case, balls: meniscus.Balls, method: str) -> tuple[float, dict[st
     """Find the surface once, on the graphics processor without reading it back: milliseconds, stages, counts."""
     info, runner = create_method(method)
     camera = three_quarter_camera(balls, *case.size)
-    field = meniscus.Field(case.kernel)
+    field = meniscus.Field(case.kernel, case.isovalue)
     request = Request(balls, camera, field, frozenset(), 0, lambda share: None)
     start = time.perf_counter()
     surface = runner.find_surface_on_device(request) if info.backend == "gpu" else runner.find_surface(request)
@@ -145,8 +154,8 @@ def find(case: Case, balls: meniscus.Balls, method: str) -> tuple[float, dict[st
 def value_of(case: Case) -> str:
     """What differs from the study's other cases."""
     size = f"{case.size[0]}x{case.size[1]}"
-    values = {"balls": f"{case.count:,}", "resolution": size, "density": f"{case.crossings:g}", "kernel": case.kernel}
-    return values[case.axis]
+    values = {"resolution": size, "density": f"{case.crossings:g}", "kernel": case.kernel}
+    return values.get(case.axis, f"{case.count:,}")
 
 
 def copy_bandwidth() -> float:

@@ -27,8 +27,8 @@ ERROR, DEPRECATED, UNDEFINED, PORTABILITY, PERFORMANCE, OTHER = 0x824C, 0x824D, 
 HIGH, MEDIUM, LOW, NOTIFICATION = 0x9146, 0x9147, 0x9148, 0x826B
 
 
-def render():
-    return meniscus.render(BALLS, CAMERA, meniscus.Field(), method="depth_peeling")
+def render(method="depth_peeling"):
+    return meniscus.render(BALLS, CAMERA, meniscus.Field(), method=method)
 
 
 @pytest.fixture
@@ -191,22 +191,23 @@ def lose_by_reset_status(context, monkeypatch):
     monkeypatch.setattr(context._driver, "_get_reset_status", lambda: INNOCENT_CONTEXT_RESET)
 
 
+@pytest.mark.parametrize("name", ["depth_peeling", "tile_lists"])
 @pytest.mark.parametrize("lose", [lose_by_error, lose_by_reset_status])
-def test_a_lost_context_fails_the_render_and_the_next_one_has_a_new_context(another_context, monkeypatch, lose):
-    expected = render()
-    info, method = registry.create_method("depth_peeling")
-    assert registry.create_method("depth_peeling") == (info, method)
+def test_a_lost_context_fails_the_render_and_the_next_one_has_a_new_context(another_context, monkeypatch, lose, name):
+    expected = render(name)
+    info, method = registry.create_method(name)
+    assert registry.create_method(name) == (info, method)
     lose(another_context, monkeypatch)
     sentence = "^The graphics driver was reset and what was being rendered is lost; render again, .*$"
     with pytest.raises(DeviceError, match=sentence):
-        render()
+        render(name)
     # A render that holds the lost context fails like that whenever it goes on.
     with pytest.raises(DeviceError, match=sentence):
         another_context.run(lambda: pytest.fail("work in a lost context"))
-    image = render()
+    image = render(name)
     assert another_context.is_lost
     assert context_module.shared_context() is not another_context
-    assert registry.create_method("depth_peeling")[1] is not method
+    assert registry.create_method(name)[1] is not method
     np.testing.assert_array_equal(image["depth"], expected["depth"])
     check_silence(context_module.shared_context())
 
