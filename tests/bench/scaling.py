@@ -24,7 +24,7 @@ from . import machine, report
 from .scenes import CROSSINGS, dense_balls, three_quarter_camera
 
 REPEATS = 5
-WARM_UP = 0.5
+WARM_UP = 2.0
 """Seconds of rendering before what counts on a graphics processor, which needs some to raise its clock."""
 COPIED_BYTES = 1 << 26
 COPIES = 8
