@@ -4,6 +4,7 @@
 //! with an error instead of an abort. Everything else is a way to find the surface.
 
 pub mod balls;
+pub mod clusters;
 pub mod error;
 pub mod field;
 pub mod fitted_bvh;
