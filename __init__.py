@@ -16,6 +16,7 @@ _HOMES = {
     "Camera": ".addon.fluid.camera",
     "DeepImage": ".addon.fluid.deep_image",
     "Field": ".addon.fluid.field",
+    "find_clusters": ".addon.render.clusters",
     "FittedBvh": ".addon.render.fitted_bvh",
     "ImageBuffers": ".addon.fluid.image",
     "Look": ".addon.fluid.look",

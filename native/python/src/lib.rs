@@ -2,6 +2,7 @@
 //! bad input is a ValueError, too little memory a MemoryError, a defect of ours a RuntimeError.
 
 mod arrays;
+mod clusters;
 mod fitted_bvh;
 mod oracle;
 mod rasterizer;
@@ -15,6 +16,8 @@ use pyo3::prelude::*;
 mod meniscus_native {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use super::clusters::find_clusters;
     #[pymodule_export]
     use super::fitted_bvh::FittedBvh;
     #[pymodule_export]

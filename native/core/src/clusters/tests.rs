@@ -1,6 +1,6 @@
 use super::*;
-use crate::kernel::tests::kernels;
 use crate::kernel::Kernel;
+use crate::kernel::tests::kernels;
 
 fn wyvill() -> Kernel {
     kernels()[0].1

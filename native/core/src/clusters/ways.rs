@@ -9,6 +9,9 @@ use super::cells::Cells;
 /// As a share of the isovalue: the field is on the surface where it is as close to it.
 const CLOSE: f64 = 1e-9;
 
+/// The least step, as a share of a way: thinner gaps, and only those that balls of tiny radii make, may not be seen.
+const LEAST_STEP: f64 = 1e-4;
+
 /// A ball on a way: `x(t) = peak - ((t - middle) / R)^2`.
 struct Chord {
     peak: f64,
@@ -89,7 +92,8 @@ impl<'a> Ways<'a> {
             let fall = -slope;
             let root = (fall * fall + 2.0 * bend * gap).sqrt();
             let step = if fall > 0.0 { 2.0 * gap / (fall + root) } else { (root - fall) / bend };
-            at = if step.is_nan() { length } else { (at + step).min(next_kink(&chords, kernel, at)) };
+            let next = if step.is_nan() { length } else { (at + step).min(next_kink(&chords, kernel, at)) };
+            at = next.max(at + LEAST_STEP * length);
         }
         true
     }
@@ -125,7 +129,7 @@ fn next_kink(chords: &[Chord], kernel: &Kernel, at: f64) -> f64 {
     }
     let entries = chords.iter().filter(|chord| chord.weight < 0.0).map(Chord::entry);
     // To be there is not to be before it.
-    entries.filter(|entry| *entry > at).fold(f64::INFINITY, f64::min).max(at + f64::EPSILON * at.abs())
+    entries.filter(|entry| *entry > at).fold(f64::INFINITY, f64::min)
 }
 
 /// What `f''` along a ray is not above, times R^2 / 2: the greatest of `k x^(k-2) (2 (k - 1) a - (2 k - 1) x)` over x in [0, a].
