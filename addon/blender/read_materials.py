@@ -99,15 +99,16 @@ def _lights(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None)
 
 
 def _light(light: bpy.types.Light, world_from_light: np.ndarray) -> Light:
-    direction = -world_from_light[:3, 2]
-    length = np.linalg.norm(direction)
+    size, right, is_round = _area(light, world_from_light) if light.type == "AREA" else ((0.0, 0.0), (1.0, 0.0, 0.0), False)
     return Light(
         kind=light.type,
         power=_power(light),
         position=tuple(world_from_light[:3, 3].tolist()),
-        direction=tuple((direction / length).tolist()) if length > 0 else (0.0, 0.0, -1.0),
-        area=_area(light, world_from_light) if light.type == "AREA" else 0.0,
+        direction=_unit(-world_from_light[:3, 2], (0.0, 0.0, -1.0)),
         cone=(math.cos(light.spot_size / 2), light.spot_blend) if light.type == "SPOT" else (0.0, 0.0),
+        size=size,
+        right=right,
+        is_round=is_round,
     )
 
 
@@ -119,12 +120,18 @@ def _power(light: bpy.types.Light) -> Vector:
     return color
 
 
-def _area(light: bpy.types.AreaLight, world_from_light: np.ndarray) -> float:
-    """Square units, of the lamp as it stands in the scene."""
+def _area(light: bpy.types.AreaLight, world_from_light: np.ndarray) -> tuple[tuple[float, float], Vector, bool]:
+    """Width and height of the lamp as it stands in the scene, the direction of its width, and whether it is round."""
     width = light.size
     height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-    shape = math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1.0
-    return shape * width * height * float(np.linalg.norm(np.cross(world_from_light[:3, 0], world_from_light[:3, 1])))
+    across, along = (float(np.linalg.norm(world_from_light[:3, axis])) for axis in (0, 1))
+    right = _unit(world_from_light[:3, 0], (1.0, 0.0, 0.0))
+    return (width * across, height * along), right, light.shape in {"DISK", "ELLIPSE"}
+
+
+def _unit(vector: np.ndarray, default: Vector) -> Vector:
+    length = np.linalg.norm(vector)
+    return tuple((vector / length).tolist()) if length > 0 else default
 
 
 def _world(world: bpy.types.World | None) -> Vector:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Material:
-    """A surface as Blender's Principled BSDF describes it, as far as rays that see only the first surface can show it.
+    """A surface as Blender's Principled BSDF describes it, and what it encloses.
 
     Attributes
     ----------
@@ -19,9 +25,12 @@ class Material:
     metallic, roughness, transmission
         Each 0 to 1.
     ior
-        Index of refraction.
+        Index of refraction, greater than 0; below 1 the inside is the thinner medium.
     emission
         Radiance that the surface gives off, linear Rec.709.
+    absorption
+        How strongly what is inside takes light of each channel away, per Blender unit: the share ``exp(-absorption * length)``
+        remains (Beer's law). Only traced light knows lengths.
     """
 
     color: Vector = (0.8, 0.8, 0.8)
@@ -30,6 +39,7 @@ class Material:
     transmission: float = 0.0
     ior: float = 1.5
     emission: Vector = (0.0, 0.0, 0.0)
+    absorption: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -46,18 +56,80 @@ class Light:
         Where it is; a sun's does not count.
     direction
         Unit vector: where it shines, along its own -z.
-    area
-        Of an area light, square units.
     cone
         Of a spot: cosine of half its angle, and the share of the cone over which its border is soft.
+    radius
+        Of a point or a spot light, Blender units; of a sun half the angle that it is seen under, radians. Only traced light
+        knows it.
+    size
+        Of an area light: width and height, Blender units.
+    right
+        Of an area light: unit vector along its width; its height is along ``cross(right, direction)``.
+    is_round
+        Whether an area light is an ellipse with that width and height; else it is a rectangle.
+    casts_shadow
+        Whether what stands in its way hides it, where light is traced.
     """
 
     kind: Literal["SUN", "POINT", "SPOT", "AREA"]
     power: Vector
     position: Vector = (0.0, 0.0, 0.0)
     direction: Vector = (0.0, 0.0, -1.0)
-    area: float = 0.0
     cone: tuple[float, float] = (0.0, 0.0)
+    radius: float = 0.0
+    size: tuple[float, float] = (0.0, 0.0)
+    right: Vector = (1.0, 0.0, 0.0)
+    is_round: bool = False
+    casts_shadow: bool = True
+
+    @property
+    def area(self) -> float:
+        """Of an area light, square units."""
+        return self.size[0] * self.size[1] * (math.pi / 4 if self.is_round else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class WorldImage:
+    """Light that comes from far away, by its direction; two are the same only where they are one.
+
+    Attributes
+    ----------
+    pixels
+        (H, W, 3) float32, C-contiguous: equirectangular, linear Rec.709, row 0 at the bottom (straight down). As in Blender
+        the middle of the image is seen along +x of the image's own space, a quarter of the width is seen along +y, and the
+        borders along -x. Between the centres of pixels it is interpolated linearly.
+    image_from_world
+        The rows of a rotation that turns world-space directions into the image's own space.
+
+    Raises
+    ------
+    InputError
+        The pixels have another shape or type, or are not finite, or the matrix is no rotation.
+    """
+
+    pixels: npt.NDArray[np.float32]
+    image_from_world: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    def __post_init__(self) -> None:
+        pixels = self.pixels
+        if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0 or pixels.dtype != np.float32:
+            raise InputError(
+                f"An image of the world must be float32 of the shape (H, W, 3), not {pixels.dtype} of {pixels.shape}"
+            )
+        if not np.isfinite(pixels).all():
+            raise InputError("An image of the world has pixels that are not finite: choose another image")
+        turn = np.array(self.image_from_world)
+        if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-4):
+            raise InputError("The rotation of the world's image is none: its rows must be unit vectors at right angles")
+
+    @property
+    def mean(self) -> Vector:
+        """The mean radiance over all directions."""
+        height = len(self.pixels)
+        # What a row takes up on the sphere.
+        shares = np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)
+        red, green, blue = np.average(self.pixels.mean(axis=1, dtype=np.float64), axis=0, weights=shares).tolist()
+        return red, green, blue
 
 
 @dataclass(frozen=True)
@@ -84,7 +156,19 @@ class FluidSource:
 
 @dataclass(frozen=True)
 class Lighting:
-    """Lights, and the radiance that the world sends from everywhere, linear Rec.709."""
+    """The light of a scene.
+
+    Attributes
+    ----------
+    lights
+        Its lights.
+    world
+        Radiance that the world sends from everywhere, linear Rec.709. Where it has an image: that by which light that is not
+        traced stands for it, :attr:`WorldImage.mean`.
+    image
+        What the world sends by direction; None where that is one colour.
+    """
 
     lights: tuple[Light, ...] = ()
     world: Vector = (0.0, 0.0, 0.0)
+    image: WorldImage | None = None

@@ -9,6 +9,7 @@ import numpy as np
 
 from .errors import InputError
 from .lighting import FluidSource, Lighting
+from .tracing import Tracing
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,8 @@ class Look:
         The objects that supply balls, by their index in :attr:`balls.Balls.sources`; none where nothing is known of them.
     lighting
         The light of the scene (material).
+    tracing
+        How light is followed beyond the first surface (material); None where it ends there.
 
     Raises
     ------
@@ -140,6 +143,7 @@ class Look:
     depth_contrast_radius: float = 0.04
     sources: tuple[FluidSource, ...] = ()
     lighting: Lighting = Lighting()
+    tracing: Tracing | None = None
 
     def __post_init__(self) -> None:
         if self.style not in LOOK_STYLES:
