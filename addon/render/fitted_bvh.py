@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -136,6 +136,11 @@ class FittedBvh:
                 threads=threads,
                 watch=watch,
             )
+
+    @property
+    def native(self) -> Any:
+        """The tree as the core has it; it holds no balls."""
+        return self._native
 
     @property
     def bytes(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.camera import Camera
-from ..fluid.lighting import Lighting, Material, Vector
+from ..fluid.lighting import Light, Lighting, Material, Vector
 from . import native
 from .surroundings import Color
 from .vector_math import FloatArray
@@ -103,8 +103,25 @@ def _vector(values: npt.NDArray[np.float64]) -> Vector:
     return float(values[0]), float(values[1]), float(values[2])
 
 
+def material_tuples(materials: tuple[Material, ...]) -> list[tuple[Any, ...]]:
+    """Materials as the core takes them."""
+    return [
+        (item.metallic, item.roughness, item.transmission, item.ior, item.emission, item.color, item.absorption)
+        for item in materials
+    ]
+
+
+def light_tuples(lights: tuple[Light, ...]) -> list[tuple[Any, ...]]:
+    """Lights as the core takes them."""
+    return [
+        (
+            *(light.kind, light.position, light.direction, light.power, light.area, light.cone),
+            *(light.radius, light.size, light.right, light.is_round, light.casts_shadow),
+        )
+        for light in lights
+    ]
+
+
 def _scene(materials: tuple[Material, ...], lighting: Lighting) -> tuple[Any, ...]:
     """Materials, lights and world as the core takes them."""
-    surfaces = [(item.metallic, item.roughness, item.transmission, item.ior, item.emission) for item in materials]
-    lights = [(light.kind, light.position, light.direction, light.power, light.area, light.cone) for light in lighting.lights]
-    return surfaces, lights, lighting.world
+    return material_tuples(materials), light_tuples(lighting.lights), lighting.world

@@ -17,3 +17,4 @@ pub mod rasterizer;
 pub mod shading;
 pub mod simd;
 pub mod tile_caster;
+pub mod tracing;

@@ -21,7 +21,8 @@ const NODE_NUMBERS: usize = 8;
 /// raises cancels.
 #[pyclass(frozen)]
 pub struct FittedBvh {
-    bvh: Bvh,
+    /// The tree.
+    pub bvh: Bvh,
 }
 
 #[pymethods]

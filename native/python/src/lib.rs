@@ -9,6 +9,7 @@ mod rasterizer;
 mod run;
 mod shading;
 mod tile_caster;
+mod tracing;
 
 use pyo3::prelude::*;
 
@@ -28,6 +29,8 @@ mod meniscus_native {
     use super::shading::{label, place, shade_image, shade_points};
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
+    #[pymodule_export]
+    use super::tracing::{Triangles, WorldImage, trace_image};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -11,11 +11,11 @@ use crate::arrays::{Pixels, ReadPixels, Rows};
 use crate::run::{python_error, run};
 
 /// camera_from_world, eye, window, is_perspective, width, height, clip: as `TileCaster` takes them by name.
-type ViewArguments = ([[f64; 3]; 3], [f64; 3], [f64; 4], bool, usize, usize, [f64; 2]);
-/// metallic, roughness, transmission, ior, emission.
-type MaterialArguments = (f32, f32, f32, f32, [f32; 3]);
-/// kind (SUN, POINT, SPOT or AREA), position, direction, power, area, cone.
-type LightArguments = (String, [f32; 3], [f32; 3], [f32; 3], f32, [f32; 2]);
+pub type ViewArguments = ([[f64; 3]; 3], [f64; 3], [f64; 4], bool, usize, usize, [f64; 2]);
+/// metallic, roughness, transmission, ior, emission, color, absorption.
+pub type MaterialArguments = (f32, f32, f32, f32, [f32; 3], [f32; 3], [f32; 3]);
+/// kind (SUN, POINT, SPOT or AREA), position, direction, power, area, cone, radius, size, right, is_round, casts_shadow.
+pub type LightArguments = (String, [f32; 3], [f32; 3], [f32; 3], f32, [f32; 2], f32, [f32; 2], [f32; 3], bool, bool);
 
 /// Lays the light of a surface over what is behind it, in all pixels that have a material.
 ///
@@ -198,23 +198,27 @@ fn written<'a, const C: usize>(image: &'a mut Option<Pixels<'_, f32, C>>) -> PyR
     }
 }
 
-fn view_of((camera_from_world, eye, window, is_perspective, width, height, clip): ViewArguments) -> View {
+/// A camera.
+pub fn view_of((camera_from_world, eye, window, is_perspective, width, height, clip): ViewArguments) -> View {
     View { camera_from_world, eye, window, is_perspective, width, height, clip }
 }
 
-fn materials_of(materials: Vec<MaterialArguments>) -> Vec<Material> {
-    let material = |(metallic, roughness, transmission, ior, emission): MaterialArguments| Material {
-        metallic,
-        roughness,
-        transmission,
-        ior,
-        emission,
+/// Materials.
+pub fn materials_of(materials: Vec<MaterialArguments>) -> Vec<Material> {
+    let material = |arguments: MaterialArguments| {
+        let (metallic, roughness, transmission, ior, emission, color, absorption) = arguments;
+        Material { metallic, roughness, transmission, ior, emission, color, absorption }
     };
     materials.into_iter().map(material).collect()
 }
 
-fn lights_of(lights: Vec<LightArguments>) -> PyResult<Vec<Light>> {
-    let light = |(kind, position, direction, power, area, cone): LightArguments| {
+/// Lights.
+///
+/// # Errors
+/// ValueError where there is no such kind.
+pub fn lights_of(lights: Vec<LightArguments>) -> PyResult<Vec<Light>> {
+    let light = |arguments: LightArguments| {
+        let (kind, position, direction, power, area, cone, radius, size, right, is_round, casts_shadow) = arguments;
         let kind = match kind.as_str() {
             "SUN" => LightKind::Sun,
             "POINT" => LightKind::Point,
@@ -222,7 +226,7 @@ fn lights_of(lights: Vec<LightArguments>) -> PyResult<Vec<Light>> {
             "AREA" => LightKind::Area,
             _ => return Err(PyValueError::new_err(format!("there is no kind of light called '{kind}'"))),
         };
-        Ok(Light { kind, position, direction, power, area, cone })
+        Ok(Light { kind, position, direction, power, area, cone, radius, size, right, is_round, casts_shadow })
     };
     lights.into_iter().map(light).collect()
 }

@@ -80,6 +80,25 @@ impl<S: Simd> Point<S> {
     }
 }
 
+/// The field is surely on one side of the isovalue where it is as far from it, relatively, as it is said to be computed.
+const SURELY_OFF: f32 = 1e-5;
+
+/// Of the radius of a ball: how far distances to it are off at most, and how far a ray is lifted off the surface at most where
+/// the field is level.
+const DISTANCE_OFF: f32 = 1e-6;
+const MOST_LIFT: f32 = 1e-3;
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Unit, out of the fluid.
+    pub normal: [f32; 3],
+    /// Index of the ball with the greatest share of the field, among those of the leaf.
+    pub ball: usize,
+    /// So far from the surface the field is surely on one side of the isovalue.
+    pub lift: f32,
+}
+
 /// What leaves are searched with.
 pub struct Searcher<'a, S: Simd> {
     simd: S,
@@ -285,10 +304,9 @@ impl<'a, S: Simd> Searcher<'a, S> {
         field.reduce_sum() >= self.density.isovalue
     }
 
-    /// The unit normal that points out of the fluid at a point of the surface, `level` where the field is level there, and the
-    /// index of the ball with the greatest share of the field.
+    /// A point of the surface; its normal is `level` where the field is level there.
     #[inline(always)]
-    pub fn surface(&self, packets: &[Packet], point: [f64; 3], level: [f32; 3]) -> ([f32; 3], usize) {
+    pub fn surface(&self, packets: &[Packet], point: [f64; 3], level: [f32; 3]) -> Place {
         let simd = self.simd;
         let point = Point::new(simd, point);
         let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
@@ -314,6 +332,34 @@ impl<'a, S: Simd> Searcher<'a, S> {
         let normal = if length > 0.0 { inward.map(|c| (-c / length) as f32) } else { level };
         let (shares, packet_of) = (most.lanes().0, strongest.lanes().0);
         let lane = (1..LANES).fold(0, |best, lane| if shares[lane] > shares[best] { lane } else { best });
-        (normal, packet_of[lane] as usize * LANES + lane)
+        let packet = packet_of[lane] as usize;
+        let radius = packets[packet].inverse_square.0[lane].sqrt().recip();
+        // The gradient is twice the pull; not a number is the most.
+        let off = SURELY_OFF * self.density.isovalue / (2.0 * length as f32);
+        let lift = off.min(MOST_LIFT * radius) + DISTANCE_OFF * radius;
+        Place { normal, ball: packet * LANES + lane, lift }
+    }
+
+    /// The mean of the balls' colours at a point, each weighted by its share of the field; balls that carve have none.
+    #[inline(always)]
+    pub fn blend(&self, packets: &[Packet], ids: &[u32], point: [f64; 3], colors: &[[f32; 3]]) -> [f32; 3] {
+        let simd = self.simd;
+        let point = Point::new(simd, point);
+        let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
+        let (mut sum, mut total) = ([0.0f32; 3], 0.0);
+        for (packet, ids) in packets.iter().zip(ids.chunks(LANES)) {
+            let x = length_squared(point.to_centers(simd, packet)).neg_mul_add(simd.load(&packet.inverse_square), one);
+            let shares = (simd.load(&packet.weight) * self.kernel.value(x.max(zero))).max(zero).lanes().0;
+            for (share, id) in shares.into_iter().zip(ids) {
+                if share > 0.0 {
+                    let color = colors[*id as usize];
+                    total += share;
+                    for (channel, part) in sum.iter_mut().zip(color) {
+                        *channel += share * part;
+                    }
+                }
+            }
+        }
+        if total > 0.0 { sum.map(|channel| channel / total) } else { sum }
     }
 }

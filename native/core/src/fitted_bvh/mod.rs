@@ -1,19 +1,19 @@
 //! The fitted bounding volume hierarchy for metaballs (Gourmel, Pajot, Paulin, Barthe, Poulin 2010): any rays, also
 //! incoherent ones, against the surface. `docs/fitted_bvh.md` derives what goes beyond the paper.
 
-mod bounds;
+pub(crate) mod bounds;
 mod cast;
 mod construction;
 mod density;
 mod discarding;
-mod hierarchy;
+pub(crate) mod hierarchy;
 mod leaf;
 mod members;
 mod options;
-mod ray;
+pub(crate) mod ray;
 mod split;
-mod traversal;
-mod wide;
+pub(crate) mod traversal;
+pub(crate) mod wide;
 
 use crate::balls::{Balls, bounded_weight};
 use crate::error::Result;

@@ -17,6 +17,9 @@ pub struct Hit {
     pub normal: [f32; 3],
     /// The ball with the greatest share of the field.
     pub ball: u32,
+    /// So far from the surface, along the normal, a ray begins surely on one side of it.
+    pub lift: f32,
+    leaf: usize,
 }
 
 /// What is counted on the way.
@@ -71,9 +74,11 @@ impl Counter for Counts {
 
 /// A child that a segment enters at a distance.
 #[derive(Clone, Copy, Debug)]
-struct Entered {
-    at: f32,
-    child: u32,
+pub struct Entered {
+    /// Distance from the segment's start, or less by rounding.
+    pub at: f32,
+    /// As in [`WideNode`].
+    pub child: u32,
 }
 
 /// Where a segment crosses the surface, and in which leaf.
@@ -109,8 +114,22 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
         let Kind::Leaf { first, count } = self.bvh.tree.nodes[found.leaf].kind() else { return None };
         let packets = self.bvh.tree.packets_of(first, count);
         let facing = segment.direction.map(|c| if found.leaves { c } else { -c } as f32);
-        let (normal, index) = self.searcher.surface(packets, segment.at(found.distance), facing);
-        Some(Hit { t: segment.t_start + found.distance, normal, ball: self.bvh.tree.ids[first + index] })
+        let place = self.searcher.surface(packets, segment.at(found.distance), facing);
+        Some(Hit {
+            t: segment.t_start + found.distance,
+            normal: place.normal,
+            ball: self.bvh.tree.ids[first + place.ball],
+            lift: place.lift,
+            leaf: found.leaf,
+        })
+    }
+
+    /// The colours of the balls at a hit, each weighted by its share of the field.
+    #[inline(always)]
+    pub fn color(&self, hit: &Hit, point: [f64; 3], colors: &[[f32; 3]]) -> [f32; 3] {
+        let Kind::Leaf { first, count } = self.bvh.tree.nodes[hit.leaf].kind() else { return [0.0; 3] };
+        let local = std::array::from_fn(|axis| point[axis] - self.bvh.origin[axis]);
+        self.searcher.blend(self.bvh.tree.packets_of(first, count), &self.bvh.tree.ids[first..first + count], local, colors)
     }
 
     /// Whether a ray crosses the surface.
@@ -135,7 +154,9 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
                 continue;
             }
             if entered.child & LEAF == 0 {
-                self.enter_children(&boxes, &self.bvh.wide[entered.child as usize], end as f32);
+                self.counter.visit();
+                let node = &self.bvh.wide[entered.child as usize];
+                enter_children(self.simd, &boxes, node, end as f32, &mut self.waiting);
                 continue;
             }
             let leaf = (entered.child & !LEAF) as usize;
@@ -174,28 +195,6 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
         None
     }
 
-    /// Puts the children that a segment meets before `end` onto the stack, the nearest on top.
-    #[inline(always)]
-    fn enter_children(&mut self, boxes: &BoxTest<S>, node: &WideNode, end: f32) {
-        self.counter.visit();
-        let (meets, enters) = boxes.meets(self.simd, node, self.simd.splat(end));
-        let mut rest = meets.bits();
-        let enters = enters.lanes().0;
-        let bottom = self.waiting.len();
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
-            let entered = Entered { at: enters[lane], child: node.children[lane] };
-            self.waiting.push(entered);
-            let mut place = self.waiting.len() - 1;
-            while place > bottom && self.waiting[place - 1].at < entered.at {
-                self.waiting[place] = self.waiting[place - 1];
-                place -= 1;
-            }
-            self.waiting[place] = entered;
-        }
-    }
-
     #[inline(always)]
     fn search(&mut self, segment: &Segment, leaf: usize, end: f64, search: Search) -> Option<f64> {
         let node = &self.bvh.tree.nodes[leaf];
@@ -210,4 +209,25 @@ impl<'a, S: Simd, C: Counter> Caster<'a, S, C> {
 
 fn contains(node: &Node, point: &[f64; 3]) -> bool {
     (0..3).all(|axis| f64::from(node.low[axis]) <= point[axis] && point[axis] <= f64::from(node.high[axis]))
+}
+
+/// Puts the children that a segment meets before `end` onto the stack, the nearest on top.
+#[inline(always)]
+pub fn enter_children<S: Simd>(simd: S, boxes: &BoxTest<S>, node: &WideNode, end: f32, waiting: &mut Vec<Entered>) {
+    let (meets, enters) = boxes.meets(simd, node, simd.splat(end));
+    let mut rest = meets.bits();
+    let enters = enters.lanes().0;
+    let bottom = waiting.len();
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize;
+        rest &= rest - 1;
+        let entered = Entered { at: enters[lane], child: node.children[lane] };
+        waiting.push(entered);
+        let mut place = waiting.len() - 1;
+        while place > bottom && waiting[place - 1].at < entered.at {
+            waiting[place] = waiting[place - 1];
+            place -= 1;
+        }
+        waiting[place] = entered;
+    }
 }

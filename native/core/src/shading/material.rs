@@ -19,6 +19,10 @@ pub struct Material {
     pub ior: f32,
     /// Radiance that it gives off.
     pub emission: [f32; 3],
+    /// Base colour, where nothing gives another.
+    pub color: [f32; 3],
+    /// What is inside takes light away, per unit of length; only traced light knows lengths.
+    pub absorption: [f32; 3],
 }
 
 /// How a light shines.
@@ -49,6 +53,16 @@ pub struct Light {
     pub area: f32,
     /// Of a spot: cosine of half its angle, and the share of it over which its border is soft.
     pub cone: [f32; 2],
+    /// Of a point or a spot light; of a sun half the angle that it is seen under.
+    pub radius: f32,
+    /// Of an area light: width and height.
+    pub size: [f32; 2],
+    /// Of an area light, unit: along its width.
+    pub right: [f32; 3],
+    /// Whether an area light is an ellipse, else it is a rectangle.
+    pub is_round: bool,
+    /// Whether what is in its way hides it.
+    pub casts_shadow: bool,
 }
 
 /// Three vectors of lanes: coordinates, or channels.
@@ -79,8 +93,9 @@ impl<S: Simd> Triple<S> {
         a.mul_add(d, b.mul_add(e, c * f))
     }
 
+    /// Each part times a factor.
     #[inline(always)]
-    fn scaled(self, factor: S::Vector) -> Self {
+    pub fn scaled(self, factor: S::Vector) -> Self {
         let [a, b, c] = self.0;
         Self([a * factor, b * factor, c * factor])
     }
@@ -119,17 +134,29 @@ pub struct Shaded<S: Simd> {
 }
 
 /// The parameters of sixteen materials.
-struct Parameters<S: Simd> {
+pub struct Parameters<S: Simd> {
     metallic: S::Vector,
     roughness: S::Vector,
     transmission: S::Vector,
     ior: S::Vector,
-    emission: Triple<S>,
+    /// Radiance that they give off.
+    pub emission: Triple<S>,
+}
+
+/// Sixteen points of surfaces.
+pub struct Facing<S: Simd> {
+    /// Unit, on the side of the eye.
+    pub normal: Triple<S>,
+    /// Unit.
+    pub to_eye: Triple<S>,
+    /// Base colour.
+    pub base: Triple<S>,
 }
 
 impl<S: Simd> Parameters<S> {
+    /// Those of the materials with these indices.
     #[inline(always)]
-    fn gathered(simd: S, materials: &[Material], indices: &[usize; LANES]) -> Self {
+    pub fn gathered(simd: S, materials: &[Material], indices: &[usize; LANES]) -> Self {
         Self {
             metallic: gathered(simd, materials, indices, |material| material.metallic),
             roughness: gathered(simd, materials, indices, |material| material.roughness),
@@ -143,9 +170,40 @@ impl<S: Simd> Parameters<S> {
         }
     }
 
+    /// Turns those inside out that are seen from within: there air is what lies behind the surface.
+    #[inline(always)]
+    pub fn from_within(&mut self, simd: S, within: S::Mask) {
+        self.ior = (simd.splat(1.0) / self.ior).select(within, self.ior);
+    }
+
+    /// The colour of what is matt, without what is reflected before light gets there.
+    #[inline(always)]
+    pub fn matt(&self, simd: S, base: Triple<S>) -> Triple<S> {
+        let one = simd.splat(1.0);
+        base.scaled((one - self.metallic) * (one - self.transmission))
+    }
+
+    /// The share of light that enters and passes, of what is not reflected and but for its colour.
+    #[inline(always)]
+    pub fn clear(&self, simd: S) -> S::Vector {
+        (simd.splat(1.0) - self.metallic) * self.transmission
+    }
+
+    /// What of a light's irradiance is sent to the eye: by what is matt, and by facets.
+    #[inline(always)]
+    pub fn sent(&self, simd: S, point: &Facing<S>, matt: Triple<S>, toward: Triple<S>) -> [Triple<S>; 2] {
+        let facing = point.normal.dot(toward).max(simd.splat(0.0));
+        let between = unit(simd, point.to_eye + toward);
+        let near = toward.dot(between);
+        let mirrored = self.reflected(simd, near, point.base);
+        let gloss = facets(simd, self.roughness, point.normal.dot(between), near, facing);
+        let diffuse = facing * simd.splat(1.0 / PI);
+        [((Triple::splat(simd, [1.0; 3]) - mirrored) * matt).scaled(diffuse), mirrored.scaled(gloss)]
+    }
+
     /// What facets reflect of light at an angle to their normal, given its cosine.
     #[inline(always)]
-    fn reflected(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Triple<S> {
+    pub fn reflected(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Triple<S> {
         let one = simd.splat(1.0);
         let cosine = cosine.max(simd.splat(1e-3)).min(one);
         let dielectric = self.fresnel(simd, cosine);
@@ -221,29 +279,20 @@ pub fn shade<S: Simd>(
     to_eye: Triple<S>,
     base: Triple<S>,
 ) -> Shaded<S> {
-    let (one, zero) = (simd.splat(1.0), simd.splat(0.0));
     let parameters = Parameters::gathered(simd, scene.materials, material);
-    let body = one - parameters.metallic;
-    let matt = base.scaled(body * (one - parameters.transmission));
+    let matt = parameters.matt(simd, base);
     let reflected = parameters.reflected(simd, normal.dot(to_eye), base);
     let (world, white) = (Triple::splat(simd, scene.world), Triple::splat(simd, [1.0; 3]));
-    let mut radiance = parameters.emission + reflected.beside(one, matt) * world;
+    let mut radiance = parameters.emission + reflected.beside(simd.splat(1.0), matt) * world;
+    let point = Facing { normal, to_eye, base };
     for light in scene.lights {
         let (toward, irradiance) = shine(simd, light, position);
-        let facing = normal.dot(toward).max(zero);
-        if !zero.lt(facing).any() {
-            continue;
+        if simd.splat(0.0).lt(normal.dot(toward)).any() {
+            let [diffuse, gloss] = parameters.sent(simd, &point, matt, toward);
+            radiance = radiance + (diffuse + gloss) * irradiance;
         }
-        let between = unit(simd, to_eye + toward);
-        let near = toward.dot(between);
-        let mirrored = parameters.reflected(simd, near, base);
-        let gloss = facets(simd, parameters.roughness, normal.dot(between), near, facing);
-        let diffuse = facing * simd.splat(1.0 / PI);
-        let sent = ((white - mirrored) * matt).scaled(diffuse) + mirrored.scaled(gloss);
-        radiance = radiance + sent * irradiance;
     }
-    let clear = body * parameters.transmission;
-    let transmittance = (white - reflected).scaled(clear) * base;
+    let transmittance = (white - reflected).scaled(parameters.clear(simd)) * base;
     Shaded { radiance, transmittance }
 }
 

@@ -3,7 +3,7 @@
 //! Each light shines by its own formula, without shadows; the world sends the same light from everywhere. What lies behind a
 //! surface that lets light pass is laid under it.
 
-mod material;
+pub(crate) mod material;
 #[cfg(test)]
 mod tests;
 

@@ -2,9 +2,28 @@
 
 use super::*;
 
-const DULL: Material = Material { metallic: 0.0, roughness: 1.0, transmission: 0.0, ior: 1.0, emission: [0.0; 3] };
-const NO_LIGHT: Light =
-    Light { kind: LightKind::Sun, position: [0.0; 3], direction: [0.0, 0.0, -1.0], power: [0.0; 3], area: 0.0, cone: [0.0; 2] };
+const DULL: Material = Material {
+    metallic: 0.0,
+    roughness: 1.0,
+    transmission: 0.0,
+    ior: 1.0,
+    emission: [0.0; 3],
+    color: [0.0; 3],
+    absorption: [0.0; 3],
+};
+const NO_LIGHT: Light = Light {
+    kind: LightKind::Sun,
+    position: [0.0; 3],
+    direction: [0.0, 0.0, -1.0],
+    power: [0.0; 3],
+    area: 0.0,
+    cone: [0.0; 2],
+    radius: 0.0,
+    size: [0.0; 2],
+    right: [1.0, 0.0, 0.0],
+    is_round: false,
+    casts_shadow: true,
+};
 
 /// The light of one point at the origin that faces the eye and the lights above it.
 fn point(path: Path, material: Material, lights: &[Light], world: [f32; 3], color: [f32; 3]) -> [f32; 3] {
