@@ -213,7 +213,13 @@ class SceneRender:
         )
 
     def _shot(
-        self, moment: _Moment, camera: Camera, passes: tuple[str, ...], control: Control, motion: Motion | None = None
+        self,
+        moment: _Moment,
+        camera: Camera,
+        passes: tuple[str, ...],
+        control: Control,
+        motion: Motion | None = None,
+        sample: int = 0,
     ) -> ImageBuffers:
         return render(
             moment.fluid.balls,
@@ -228,6 +234,7 @@ class SceneRender:
             backdrop=moment.backdrop(camera, self.settings.threads, control, motion),
             motion=motion,
             memory=control.memory,
+            sample=sample,
         )
 
     def _antialias(self, image: ImageBuffers, control: Control) -> None:
@@ -239,7 +246,10 @@ class SceneRender:
         with timed(image.info.milliseconds, "samples"):
             for number, moment in self._further_samples():
                 control.on_progress(number / self.settings.samples, f"Sample {number + 1} of {self.settings.samples}")
-                mean.add(self._shot(moment, moment.camera.shifted(*sample_offset(number)), names, control), moment.object_names)
+                image_of_sample = self._shot(
+                    moment, moment.camera.shifted(*sample_offset(number)), names, control, sample=number
+                )
+                mean.add(image_of_sample, moment.object_names)
         mean.put_into(image)
 
     def _further_samples(self) -> Iterator[tuple[int, _Moment]]:

@@ -61,11 +61,11 @@ def backdrop(
     holds_out = np.array([are_holdouts or item.is_holdout for item in meshes.objects])
     is_holdout = hit & holds_out[objects]
     shown = hit & ~is_holdout
+    material = np.where(shown, meshes.material[triangle], np.int32(-1))
     rgba, color = np.empty((*hit.shape, 4), np.float32), np.zeros((*hit.shape, 3), np.float32)
     rgba[:] = background
     rgba[is_holdout] = _HOLE
     if shown.any():
-        material = np.where(shown, meshes.material[triangle], np.int32(-1))
         color[shown] = np.array([item.color for item in meshes.materials], np.float32)[material[shown]]
         shade_image(rgba, depth, normal, color, material, camera, meshes.materials, lighting, threads=threads, watch=watch)
     sides = (None, None) if motion is None else (motion.previous_vertices, motion.following_vertices)
@@ -81,6 +81,9 @@ def backdrop(
         is_holdout=is_holdout,
         names=tuple(item.name for item in meshes.objects),
         pass_indices=tuple(item.pass_index for item in meshes.objects),
+        is_film_clear=background[3] == 0,
+        meshes=meshes,
+        material=material,
         to_previous=to_previous,
         to_following=to_following,
     )

@@ -21,6 +21,7 @@ from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_norm
 from .spans import find_spans
 from .surroundings import Backdrop, Color, Motion
 from .thickness import at_pixels, thickness_image
+from .tracing import SeenSurface, TracedScene, trace_image
 
 FloatArray = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
@@ -65,6 +66,8 @@ class PassImages:
         Of the camera, which meshes have as ways in the backdrop; None where it stands still.
     names
         The passes that will be asked for.
+    sample
+        How many images of this view were made before; traced light has other samples in each.
     """
 
     def __init__(
@@ -76,8 +79,9 @@ class PassImages:
         backdrop: Backdrop | None,
         motion: Motion | None,
         names: tuple[str, ...],
+        sample: int = 0,
     ) -> None:
-        self._names = names
+        self._names, self._sample = names, sample
         self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
         self._behind = backdrop
         # Where no object is behind, the fluid's passes are whole as they are.
@@ -265,11 +269,14 @@ class PassImages:
             behind: Color | None = (0.0, 0.0, 0.0, 0.0)
         else:
             behind = self._behind.color_behind if self._is_alone else None
-        if behind is None or not uses_scene:
+        is_traced = uses_scene and self._look.tracing is not None
+        if behind is None or is_traced or not uses_scene:
             rgba[:] = behind if self._behind is None else self._behind.rgba
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
-        if uses_scene:
+        if is_traced:
+            self._trace(rgba)
+        elif uses_scene:
             self._shade_materials(rgba, behind)
         elif shown.any():
             balls, camera = self._request.balls, self._request.camera
@@ -291,6 +298,37 @@ class PassImages:
             self._look.lighting,
             self._contrast,
             behind=behind,
+            threads=request.threads,
+            watch=request.watch,
+        )
+
+    def _trace(self, rgba: FloatArray) -> None:
+        """Trace the light of fluid and meshes that show themselves."""
+        tracing = self._look.tracing
+        if tracing is None:
+            return
+        request, surface, backdrop = self._request, self._surface, self._backdrop
+        materials = tuple(source.material for source in self._sources)
+        if request.balls.colors is None:
+            materials = tuple(replace(material, color=self._look.color) for material in materials)
+        ball = np.full(self.hit.shape, -1, np.int32)
+        np.copyto(ball, 0 if surface.ball is None else surface.ball, where=self._fluid)
+        material, color = self._shown_source, self._color
+        if backdrop is not None and backdrop.material is not None:
+            others = self.hit & ~self._fluid
+            material = np.where(others, backdrop.material + np.int32(len(materials)), material)
+            color = np.where(self._fluid[..., None], color, backdrop.color)
+        trace_image(
+            rgba,
+            SeenSurface(self._depth, self._normal, color, material, ball),
+            request.camera,
+            TracedScene(
+                request.balls, request.field, materials, self._look.lighting, None if backdrop is None else backdrop.meshes
+            ),
+            tracing,
+            self._contrast,
+            image=self._sample,
+            is_film_clear=self._behind is None or self._behind.is_film_clear,
             threads=request.threads,
             watch=request.watch,
         )

@@ -42,6 +42,7 @@ def render(
     backdrop: Backdrop | None = None,
     motion: Motion | None = None,
     memory: ImageMemory | None = None,
+    sample: int = 0,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -67,6 +68,9 @@ def render(
         Of the camera, for the Vector pass; None where it stands still.
     memory
         That of earlier images, used again where nobody holds these any more; None for fresh memory.
+    sample
+        How many images of this view were made before: traced light has other samples in each, so that their mean has less
+        noise.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def render(
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
     request = shot.request if memory is None else replace(shot.request, memory=memory)
-    shot = replace(shot, request=request, backdrop=backdrop, motion=motion)
+    shot = replace(shot, request=request, backdrop=backdrop, motion=motion, sample=sample)
     return shot.image(shot.choice.runner.find_surface(shot.request))
 
 
@@ -152,6 +156,7 @@ class _Shot:
     look: Look
     backdrop: Backdrop | None = None
     motion: Motion | None = None
+    sample: int = 0
 
     @classmethod
     def prepare(
@@ -201,7 +206,9 @@ class _Shot:
         """The passes of what the method has found."""
         report = self._report(surface)
         with timed(report.milliseconds, "passes"):
-            made = PassImages(surface, self.request, self.camera, self.look, self.backdrop, self.motion, self.passes)
+            made = PassImages(
+                surface, self.request, self.camera, self.look, self.backdrop, self.motion, self.passes, self.sample
+            )
             images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
             objects = _in_whole_image(made.objects, self.camera, -1) if "object_index" in self.passes else None
             return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)

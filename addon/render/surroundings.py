@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.camera import Camera
+from ..fluid.meshes import Meshes
 from ..fluid.passes import DEPTH_BACKGROUND
 
 FloatArray = npt.NDArray[np.float32]
@@ -36,6 +37,11 @@ class Backdrop:
         Of the objects; none where there is no object at all.
     color_behind
         The one colour of `rgba`; None where that differs.
+    is_film_clear
+        Whether there is nothing behind everything, so that the image is transparent there.
+    meshes, material
+        What traced light meets beside the fluid, and (height, width) int32: the materials that are seen of it, -1 where there
+        is nothing; None where there are no meshes.
     to_previous, to_following
         (height, width, 3): the ways to the places one frame before and one frame after, world space, 0 where there is nothing;
         None where all stands still or motion was not asked for.
@@ -50,6 +56,9 @@ class Backdrop:
     names: tuple[str, ...] = ()
     pass_indices: tuple[int, ...] = ()
     color_behind: Color | None = None
+    is_film_clear: bool = False
+    meshes: Meshes | None = None
+    material: npt.NDArray[np.int32] | None = None
     to_previous: FloatArray | None = None
     to_following: FloatArray | None = None
 
@@ -66,6 +75,7 @@ class Backdrop:
             object=np.broadcast_to(np.int32(-1), shape),
             is_holdout=np.broadcast_to(np.False_, shape),
             color_behind=rgba,
+            is_film_clear=rgba[3] == 0,
         )
 
     @property

@@ -145,16 +145,8 @@ pub fn trace_image<'py>(
         world: World { color: *color_of_world, image: world_image.as_ref().map(|image| (&image.get().image, *turn)) },
     };
     let (reflections, refractions, shadows, occlusion_rays, occlusion_distance, samples) = tracing;
-    let settings = Settings {
-        reflections,
-        refractions,
-        shadows,
-        occlusion_rays,
-        occlusion_distance,
-        samples,
-        image,
-        is_film_clear,
-    };
+    let settings =
+        Settings { reflections, refractions, shadows, occlusion_rays, occlusion_distance, samples, image, is_film_clear };
     let image = Image {
         depth: depth.numbers(),
         normal: normal.rows(),

@@ -170,9 +170,9 @@ impl<S: Simd> Parameters<S> {
         }
     }
 
-    /// Turns those inside out that are seen from within: there air is what lies behind the surface.
+    /// Of those that are seen from within: air is what lies behind them.
     #[inline(always)]
-    pub fn from_within(&mut self, simd: S, within: S::Mask) {
+    pub fn turn_inside_out(&mut self, simd: S, within: S::Mask) {
         self.ior = (simd.splat(1.0) / self.ior).select(within, self.ior);
     }
 

@@ -70,11 +70,7 @@ fn area_shine(light: &Light, way: [f64; 3], [u, v]: [f64; 2]) -> Option<Shine> {
     let squared = dot(way, way);
     let toward = unit(way);
     let cosine = -dot(toward, double(light.direction));
-    (cosine > 0.0).then(|| Shine {
-        toward,
-        distance: squared.sqrt(),
-        irradiance: scaled(light.power, cosine / (PI * squared)),
-    })
+    (cosine > 0.0).then(|| Shine { toward, distance: squared.sqrt(), irradiance: scaled(light.power, cosine / (PI * squared)) })
 }
 
 /// The radiance that a ray meets in a light before it meets anything at a distance.

@@ -207,13 +207,8 @@ impl<'a, S: Simd> Tracer<'a, S> {
                 (plus(view.eye, 1.0, aside), forward, depth)
             };
             let error = depth_error(surfaces, self.scene, pixel, t);
-            let path = Path {
-                pixel: index,
-                seed: random::mixed(pixel as u32 + 1),
-                reflections: 0,
-                refractions: 0,
-                is_straight: true,
-            };
+            let path =
+                Path { pixel: index, seed: random::mixed(pixel as u32 + 1), reflections: 0, refractions: 0, is_straight: true };
             let ray = Ray { origin, direction, t_min: t - error, t_max: t + error };
             self.flights.push(Flight { ray, light: [1.0; 3], path, medium: AIR, purpose: Purpose::Eye });
         }
@@ -231,10 +226,10 @@ impl<'a, S: Simd> Tracer<'a, S> {
                 _ => None,
             };
             let hit = if ball.is_some_and(|ball| ball < 0) { None } else { self.fluid.first_hit(&flight.ray) };
-            let mut arrival = match hit {
-                Some(hit) => Some(self.on_fluid(&flight, &hit)),
-                None => None,
-            };
+            let mut arrival = None;
+            if let Some(hit) = hit {
+                arrival = Some(self.on_fluid(&flight, &hit));
+            }
             if ball.is_none_or(|ball| ball < 0) {
                 let end = arrival.map_or(flight.ray.t_max, |arrival| arrival.t);
                 if let Some(met) = self.meshes.hit(&Ray { t_max: end, ..flight.ray }, false) {
@@ -317,7 +312,7 @@ impl<'a, S: Simd> Tracer<'a, S> {
             base: triples(simd, &block.base),
         };
         let mut parameters = Parameters::gathered(simd, self.scene.materials, &block.material);
-        parameters.from_within(simd, simd.mask(block.within));
+        parameters.turn_inside_out(simd, simd.mask(block.within));
         let matt = parameters.matt(simd, point.base);
         let reflected = parameters.reflected(simd, simd.load(&block.cosine), point.base);
         let entering = Triple::splat(simd, [1.0; 3]) - reflected;

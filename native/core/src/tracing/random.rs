@@ -80,11 +80,7 @@ pub fn facet([x, y, z]: [f64; 3], alpha: f64, [u, v]: [f64; 2]) -> [f64; 3] {
     let (sine, cosine) = (TAU * u).sin_cos();
     let height = (1.0 - v) * (1.0 + eye[2]) - eye[2];
     let radius = (1.0 - height * height).max(0.0).sqrt();
-    super::vectors::unit([
-        alpha * (radius * cosine + eye[0]),
-        alpha * (radius * sine + eye[1]),
-        (height + eye[2]).max(1e-9),
-    ])
+    super::vectors::unit([alpha * (radius * cosine + eye[0]), alpha * (radius * sine + eye[1]), (height + eye[2]).max(1e-9)])
 }
 
 #[cfg(test)]

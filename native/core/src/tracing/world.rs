@@ -175,7 +175,8 @@ mod tests {
     #[cfg_attr(miri, ignore = "too slow")]
     fn irradiance_is_that_of_the_sphere() {
         // A world whose radiance is 2 + z gives pi (2 + 2 z / 3).
-        let pixels = (0..256 * 128).map(|index| [2.0 + (PI * (f64::from(index / 256) + 0.5) / 128.0 - PI / 2.0).sin() as f32; 3]);
+        let pixels =
+            (0..256 * 128).map(|index| [2.0 + (PI * (f64::from(index / 256) + 0.5) / 128.0 - PI / 2.0).sin() as f32; 3]);
         let image = WorldImage::new(pixels.collect(), 256, 128).unwrap();
         let turned = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let world = World { color: [0.0; 3], image: Some((&image, turned)) };
