@@ -64,6 +64,18 @@ LIGHTS = st.tuples(
     VECTOR,
     st.floats(0, 2, width=32),
     st.tuples(st.floats(0, 1, width=32), st.floats(0, 1, width=32)),
+    st.floats(0, 1, width=32),
+    st.tuples(st.floats(0, 2, width=32), st.floats(0, 2, width=32)),
+    VECTOR,
+    st.booleans(),
+    st.booleans(),
+)
+TRACING = st.tuples(
+    *[st.integers(0, 3)] * 2,
+    st.booleans(),
+    st.integers(0, 3),
+    st.floats(0, 9, width=32) | st.just(float("nan")),
+    st.integers(0, 2),
 )
 
 
@@ -72,6 +84,22 @@ def views(sizes: Sizes) -> st.SearchStrategy[tuple[Any, ...]]:
     eye = array("f8", -2, 2, 3).map(lambda numbers: numbers.tolist())
     fixed = np.eye(3).tolist(), [-1.0, 1.0, -1.0, 1.0], [0.125, 8.0]
     return st.builds(lambda at, flag: (fixed[0], at, fixed[1], flag, sizes.width, sizes.height, fixed[2]), eye, st.booleans())
+
+
+def traced_fluid(positions: np.ndarray, radii: np.ndarray, colors: np.ndarray, materials: np.ndarray) -> tuple[Any, ...]:
+    """Balls as light meets them; those that the tree refuses have one that is empty."""
+    kernel, weights = [0, 0, 5 / 9, 4 / 9], np.ones(len(radii), np.float32)
+    try:
+        return meniscus_native.FittedBvh(positions, radii, weights, kernel, 0.2), radii, colors, materials
+    except ValueError:
+        none = np.empty((0, 3), np.float32)
+        return meniscus_native.FittedBvh(none, none[:, 0].copy(), none[:, 0].copy(), kernel, 0.2), radii, colors, materials
+
+
+def traced_meshes(vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, materials: np.ndarray) -> tuple[Any, ...]:
+    """Triangles as light meets them, moved to the origin where their vertices are unusable."""
+    usable = np.where(np.isfinite(vertices), vertices, 0)
+    return meniscus_native.Triangles(usable, triangles), normals, materials
 
 
 # For each parameter's name: what fits it.
@@ -124,16 +152,40 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "point_colors": lambda sizes: array("f4", 0, 1, sizes.balls, 3),
     "point_materials": lambda sizes: array("i4", 0, 2, sizes.balls),
     "materials": lambda sizes: st.lists(
-        st.tuples(*[st.floats(0, 2, width=32)] * 4, st.just((0.0, 0.5, 1.0))), min_size=1, max_size=3
+        st.tuples(*[st.floats(0, 2, width=32)] * 4, st.just((0.0, 0.5, 1.0)), VECTOR, VECTOR), min_size=1, max_size=3
     ),
     "lights": lambda sizes: st.lists(LIGHTS, max_size=3),
     "world": lambda sizes: array("f4", 0, 1, 3).map(lambda numbers: numbers.tolist()),
+    "pixels": lambda sizes: array("f4", 0, 1, sizes.height, sizes.width, 3),
+    "fluid": lambda sizes: st.builds(
+        traced_fluid,
+        *(array("f4", low, 2, sizes.balls, *shape) for low, shape in ((-2, (3,)), (0.1, ()), (0.1, (3,)))),
+        array("i4", 0, 2, sizes.balls),
+    ),
+    "meshes": lambda sizes: st.builds(
+        traced_meshes,
+        array("f4", -2, 2, 9, 3),
+        array("i4", 0, 9, sizes.rays, 3),
+        array("f4", -1, 1, sizes.rays, 9),
+        array("i4", 0, 2, sizes.rays),
+    ),
+    "distant": lambda sizes: st.builds(
+        lambda color, pixels: (
+            color.tolist(),
+            None if pixels is None else meniscus_native.WorldImage(pixels),
+            np.eye(3).tolist(),
+        ),
+        array("f4", 0, 1, 3),
+        st.none() | st.just(np.ones((2, 4, 3), np.float32)),
+    ),
+    "tracing": lambda sizes: TRACING,
+    "number": lambda sizes: st.integers(0, 2**32 - 1),
     "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
     "behind": lambda sizes: st.none() | st.tuples(*[st.floats(width=32)] * 4),
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
-FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves")
+FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves", "is_film_clear")
 FITTING["coefficients"] = FITTING["kernel"]
 FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}

@@ -12,8 +12,18 @@ use crate::fitted_bvh::FittedBvh;
 use crate::run::{python_error, run};
 use crate::shading::{LightArguments, MaterialArguments, ViewArguments, lights_of, materials_of, view_of};
 
-/// The shape of a node as numbers.
+/// Numbers of a node in an array.
 const NODE_NUMBERS: usize = 8;
+
+/// Tree, radii, colours, materials.
+type FluidArguments<'py> = (Bound<'py, FittedBvh>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>);
+/// Tree, normals, materials.
+type MeshArguments<'py> = (Bound<'py, Triangles>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+/// Colour, image, and the rows of the rotation into its space.
+type WorldArguments<'py> = ([f32; 3], Option<Bound<'py, WorldImage>>, [[f64; 3]; 3]);
+/// Reflections, refractions, shadows, occlusion rays, their distance, samples.
+type TracingArguments = (u32, u32, bool, u32, f64, u32);
+type TreeArrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<u32>>);
 
 /// A tree over triangles.
 ///
@@ -42,7 +52,7 @@ impl Triangles {
     }
 
     /// The tree for a GPU: nodes float32 (M, 8) as those of the fitted BVH, ids uint32 (K,) of the triangles of its leaves.
-    fn arrays<'py>(&self, python: Python<'py>) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<u32>>)> {
+    fn arrays<'py>(&self, python: Python<'py>) -> PyResult<TreeArrays<'py>> {
         let nodes = self.triangles.nodes();
         let mut numbers = memory::with_capacity(nodes.len()).map_err(python_error)?;
         numbers.extend(nodes.iter().map(Node::numbers));
@@ -84,13 +94,12 @@ impl WorldImage {
 /// width) float32: factor of the light, or None.
 ///
 /// fluid: the tree, radii float32 (N,), colours float32 (N, 3) or None, materials int32 (N,) or None. meshes: the tree, normals
-/// float32 (T, 9), materials int32 (T,). world: colour, image or None, and the rows of the rotation into its space. tracing:
-/// reflections, refractions, shadows, occlusion rays, their distance, samples. image: how many were made of this view before.
+/// float32 (T, 9), materials int32 (T,). distant, the world: colour, image or None, and the rows of the rotation into its space. tracing:
+/// reflections, refractions, shadows, occlusion rays, their distance, samples. number: how many were made of this view before.
 #[pyfunction]
-#[pyo3(signature = (rgba, depth, normal, color, material, ball, contrast, view, *, fluid, meshes, materials, lights, world,
-                    tracing, image=0, is_film_clear=false, threads=0, watch=None))]
+#[pyo3(signature = (rgba, depth, normal, color, material, ball, contrast, view, *, fluid, meshes, materials, lights, distant,
+                    tracing, number=0, is_film_clear=false, threads=0, watch=None))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
-#[expect(clippy::type_complexity, reason = "each is a tuple of Python's")]
 pub fn trace_image<'py>(
     python: Python<'py>,
     rgba: &Bound<'py, PyAny>,
@@ -101,13 +110,13 @@ pub fn trace_image<'py>(
     ball: &Bound<'py, PyAny>,
     contrast: Option<&Bound<'py, PyAny>>,
     view: ViewArguments,
-    fluid: (Bound<'py, FittedBvh>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>),
-    meshes: (Bound<'py, Triangles>, Bound<'py, PyAny>, Bound<'py, PyAny>),
+    fluid: FluidArguments<'py>,
+    meshes: MeshArguments<'py>,
     materials: Vec<MaterialArguments>,
     lights: Vec<LightArguments>,
-    world: ([f32; 3], Option<Bound<'py, WorldImage>>, [[f64; 3]; 3]),
-    tracing: (u32, u32, bool, u32, f64, u32),
-    image: u32,
+    distant: WorldArguments<'py>,
+    tracing: TracingArguments,
+    number: u32,
     is_film_clear: bool,
     threads: usize,
     watch: Option<&Bound<'py, PyAny>>,
@@ -127,7 +136,7 @@ pub fn trace_image<'py>(
     let mesh_normals = Rows::<f32, 9>::borrow("mesh_normals", &meshes.1)?;
     let mesh_materials = Rows::<i32, 1>::borrow("mesh_materials", &meshes.2)?;
     let (materials, lights) = (materials_of(materials), lights_of(lights)?);
-    let (color_of_world, world_image, turn) = &world;
+    let (color_of_world, world_image, turn) = &distant;
     let scene = Scene {
         fluid: Fluid {
             bvh: &fluid.0.get().bvh,
@@ -145,8 +154,16 @@ pub fn trace_image<'py>(
         world: World { color: *color_of_world, image: world_image.as_ref().map(|image| (&image.get().image, *turn)) },
     };
     let (reflections, refractions, shadows, occlusion_rays, occlusion_distance, samples) = tracing;
-    let settings =
-        Settings { reflections, refractions, shadows, occlusion_rays, occlusion_distance, samples, image, is_film_clear };
+    let settings = Settings {
+        reflections,
+        refractions,
+        shadows,
+        occlusion_rays,
+        occlusion_distance,
+        samples,
+        image: number,
+        is_film_clear,
+    };
     let image = Image {
         depth: depth.numbers(),
         normal: normal.rows(),

@@ -121,6 +121,34 @@ pub struct Settings {
     pub is_film_clear: bool,
 }
 
+impl Settings {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `InvalidInput` where one is unusable.
+    fn check(&self) -> Result<()> {
+        let limits = [
+            ("reflections", self.reflections, 0..=64),
+            ("refractions", self.refractions, 0..=64),
+            ("occlusion rays", self.occlusion_rays, 0..=4096),
+            ("samples", self.samples, 1..=65536),
+        ];
+        for (name, number, range) in limits {
+            if !range.contains(&number) {
+                return Err(Error::InvalidInput(format!(
+                    "the number of {name} must be from {} to {}, not {number}",
+                    range.start(),
+                    range.end()
+                )));
+            }
+        }
+        if self.occlusion_distance > 0.0 {
+            return Ok(());
+        }
+        Err(Error::InvalidInput(format!("the distance of occlusion must be greater than 0, not {}", self.occlusion_distance)))
+    }
+}
+
 /// An image of surfaces that were found, row 0 at the bottom.
 #[derive(Debug)]
 pub struct Image<'a> {
@@ -147,6 +175,7 @@ pub struct Image<'a> {
 pub fn trace_image(path: Path, view: &View, scene: &Scene<'_>, settings: &Settings, image: Image<'_>, job: &Job) -> Result<()> {
     view.check()?;
     scene.check()?;
+    settings.check()?;
     let Image { depth, normal, color, material, ball, contrast, rgba } = image;
     let pixels = view.width * view.height;
     let sizes = [depth.len(), normal.len(), color.len(), material.len(), ball.len(), rgba.len()];
