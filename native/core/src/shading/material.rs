@@ -99,13 +99,6 @@ impl<S: Simd> Triple<S> {
         let [a, b, c] = self.0;
         Self([a * factor, b * factor, c * factor])
     }
-
-    /// `self + factor * (1 - self)`: what reflects beside a part that does.
-    #[inline(always)]
-    fn beside(self, one: S::Vector, factor: Self) -> Self {
-        let ([a, b, c], [d, e, f]) = (self.0, factor.0);
-        Self([a + (one - a) * d, b + (one - b) * e, c + (one - c) * f])
-    }
 }
 
 macro_rules! by_part {
@@ -143,6 +136,14 @@ pub struct Parameters<S: Simd> {
     pub emission: Triple<S>,
 }
 
+/// What becomes of light that meets facets; the rest is lost in metal.
+pub struct Met<S: Simd> {
+    /// The share that is reflected.
+    pub reflected: Triple<S>,
+    /// The share that enters.
+    pub entering: S::Vector,
+}
+
 /// Sixteen points of surfaces.
 pub struct Facing<S: Simd> {
     /// Unit, on the side of the eye.
@@ -176,17 +177,16 @@ impl<S: Simd> Parameters<S> {
         self.ior = (simd.splat(1.0) / self.ior).select(within, self.ior);
     }
 
-    /// The colour of what is matt, without what is reflected before light gets there.
+    /// The colour of what is matt, of light that enters.
     #[inline(always)]
     pub fn matt(&self, simd: S, base: Triple<S>) -> Triple<S> {
-        let one = simd.splat(1.0);
-        base.scaled((one - self.metallic) * (one - self.transmission))
+        base.scaled(simd.splat(1.0) - self.transmission)
     }
 
-    /// The share of light that enters and passes, of what is not reflected and but for its colour.
+    /// The share that passes, of light that enters.
     #[inline(always)]
-    pub fn clear(&self, simd: S) -> S::Vector {
-        (simd.splat(1.0) - self.metallic) * self.transmission
+    pub fn clear(&self) -> S::Vector {
+        self.transmission
     }
 
     /// What of a light's irradiance is sent to the eye: by what is matt, and by facets.
@@ -195,15 +195,15 @@ impl<S: Simd> Parameters<S> {
         let facing = point.normal.dot(toward).max(simd.splat(0.0));
         let between = unit(simd, point.to_eye + toward);
         let near = toward.dot(between);
-        let mirrored = self.reflected(simd, near, point.base);
+        let Met { reflected, entering } = self.meet(simd, near, point.base);
         let gloss = facets(simd, self.roughness, point.normal.dot(between), near, facing);
-        let diffuse = facing * simd.splat(1.0 / PI);
-        [((Triple::splat(simd, [1.0; 3]) - mirrored) * matt).scaled(diffuse), mirrored.scaled(gloss)]
+        let diffuse = entering * facing * simd.splat(1.0 / PI);
+        [matt.scaled(diffuse), reflected.scaled(gloss)]
     }
 
-    /// What facets reflect of light at an angle to their normal, given its cosine.
+    /// What becomes of light at an angle to facets, given its cosine.
     #[inline(always)]
-    pub fn reflected(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Triple<S> {
+    pub fn meet(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Met<S> {
         let one = simd.splat(1.0);
         let cosine = cosine.max(simd.splat(1e-3)).min(one);
         let dielectric = self.fresnel(simd, cosine);
@@ -215,7 +215,7 @@ impl<S: Simd> Parameters<S> {
             let metal = *channel + (one - *channel) * grazing;
             *channel = dielectric + self.metallic * (metal - dielectric);
         }
-        reflected
+        Met { reflected, entering: (one - self.metallic) * (one - dielectric) }
     }
 
     /// What of unpolarized light a smooth dielectric reflects.
@@ -281,9 +281,8 @@ pub fn shade<S: Simd>(
 ) -> Shaded<S> {
     let parameters = Parameters::gathered(simd, scene.materials, material);
     let matt = parameters.matt(simd, base);
-    let reflected = parameters.reflected(simd, normal.dot(to_eye), base);
-    let (world, white) = (Triple::splat(simd, scene.world), Triple::splat(simd, [1.0; 3]));
-    let mut radiance = parameters.emission + reflected.beside(simd.splat(1.0), matt) * world;
+    let Met { reflected, entering } = parameters.meet(simd, normal.dot(to_eye), base);
+    let mut radiance = parameters.emission + (reflected + matt.scaled(entering)) * Triple::splat(simd, scene.world);
     let point = Facing { normal, to_eye, base };
     for light in scene.lights {
         let (toward, irradiance) = shine(simd, light, position);
@@ -292,7 +291,7 @@ pub fn shade<S: Simd>(
             radiance = radiance + (diffuse + gloss) * irradiance;
         }
     }
-    let transmittance = (white - reflected).scaled(parameters.clear(simd)) * base;
+    let transmittance = base.scaled(entering * parameters.clear());
     Shaded { radiance, transmittance }
 }
 

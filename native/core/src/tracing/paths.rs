@@ -4,12 +4,12 @@ use crate::error::Result;
 use crate::fitted_bvh::ray::Ray;
 use crate::fitted_bvh::traversal::{Caster, Hit, Uncounted};
 use crate::job::Job;
-use crate::shading::material::{Facing, Parameters, Triple, triples};
+use crate::shading::material::{Facing, Met, Parameters, Triple, triples};
 use crate::simd::{LANES, Lanes, Simd, Vector};
 
 use super::lights::{self, Shine};
 use super::random;
-use super::triangles::{Met, TriangleCaster};
+use super::triangles::{TriangleCaster, TriangleHit};
 use super::vectors::{along, dot, double, plus, single, tangents, unit};
 use super::{Scene, Settings, Surfaces};
 
@@ -314,14 +314,13 @@ impl<'a, S: Simd> Tracer<'a, S> {
         let mut parameters = Parameters::gathered(simd, self.scene.materials, &block.material);
         parameters.turn_inside_out(simd, simd.mask(block.within));
         let matt = parameters.matt(simd, point.base);
-        let reflected = parameters.reflected(simd, simd.load(&block.cosine), point.base);
-        let entering = Triple::splat(simd, [1.0; 3]) - reflected;
+        let Met { reflected, entering } = parameters.meet(simd, simd.load(&block.cosine), point.base);
         let [r, g, b] = point.base.0;
         let zero = simd.splat(0.0);
         // A body takes its colour from light in two halves, where this comes in and where it goes out.
         let tint = Triple([r.max(zero).sqrt(), g.max(zero).sqrt(), b.max(zero).sqrt()]);
-        let passing = rows::<S>(entering.scaled(parameters.clear(simd)) * tint);
-        let ambient = rows::<S>(entering * matt);
+        let passing = rows::<S>(tint.scaled(entering * parameters.clear()));
+        let ambient = rows::<S>(matt.scaled(entering));
         let (reflected, emission) = (rows::<S>(reflected), rows::<S>(parameters.emission));
         for lane in 0..count {
             let vertex = self.vertices[start + lane];
@@ -594,7 +593,7 @@ fn as_found(surfaces: &Surfaces<'_>, pixel: usize, flight: &Flight, again: Optio
     Arrival { t: 0.5 * (t_min + t_max), normal, geometric: normal, base, material, lift: 0.5 * (t_max - t_min) }
 }
 
-fn on_mesh(scene: &Scene<'_>, flight: &Flight, met: &Met) -> Arrival {
+fn on_mesh(scene: &Scene<'_>, flight: &Flight, met: &TriangleHit) -> Arrival {
     let material = scene.meshes.materials[met.triangle] as u32;
     let corners = &scene.meshes.normals[met.triangle];
     let [u, v] = met.shares;

@@ -21,14 +21,15 @@ pub fn branch(seed: u32, use_number: u32) -> u32 {
 /// A point of the unit square; the coordinates are less than 1.
 #[inline(always)]
 pub fn square(seed: u32, index: u32) -> [f64; 2] {
-    let index = scrambled(index, seed);
-    [fraction(index.reverse_bits(), branch(seed, 1)), fraction(sobol(index), branch(seed, 2))]
+    // Indices of an aligned block stay one.
+    let index = scrambled(index.reverse_bits(), seed).reverse_bits();
+    [fraction(index, branch(seed, 1)), fraction(sobol(index).reverse_bits(), branch(seed, 2))]
 }
 
-/// Scrambles the digits of a binary fraction, and gives its value.
+/// Scrambles the digits of a binary fraction, the last of which comes first, and gives its value.
 #[inline(always)]
-fn fraction(bits: u32, seed: u32) -> f64 {
-    f64::from(scrambled(bits.reverse_bits(), seed).reverse_bits()) / 4_294_967_296.0
+fn fraction(reversed: u32, seed: u32) -> f64 {
+    f64::from(scrambled(reversed, seed).reverse_bits()) / 4_294_967_296.0
 }
 
 /// The second coordinate of Sobol's sequence, as bits of a fraction.

@@ -35,6 +35,8 @@ struct Packet([[Lanes; 3]; 3]);
 /// A tree over triangles. It keeps their corners.
 #[derive(Debug)]
 pub struct Triangles {
+    /// A box that is larger than all, so that a ray begins before what it meets, also where all is flat.
+    room: Option<Node>,
     nodes: Vec<Node>,
     wide: Vec<WideNode>,
     packets: Vec<Packet>,
@@ -44,7 +46,7 @@ pub struct Triangles {
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Met {
+pub struct TriangleHit {
     /// Distance from the ray's origin.
     pub t: f64,
     /// Its number.
@@ -73,12 +75,13 @@ impl Triangles {
             let corners = corners.map(|corner| vertices[corner as usize]);
             boxes.push(Boxed { bounds: bounds_of(&corners), id: id as u32 });
         }
-        let mut tree =
-            Self { nodes: Vec::new(), wide: Vec::new(), packets: Vec::new(), ids: Vec::new(), count: triangles.len() };
+        let (nodes, wide, packets, ids) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut tree = Self { room: None, nodes, wide, packets, ids, count: triangles.len() };
         if !boxes.is_empty() {
             job.expect(boxes.len());
             Builder { vertices, triangles, job, tree: &mut tree }.build(&mut boxes, 0)?;
             tree.wide = widened(&tree.nodes)?;
+            tree.room = tree.nodes.first().map(|root| Node::new(&roomy(&root.bounds()), root.kind()));
         }
         Ok(tree)
     }
@@ -113,6 +116,12 @@ struct Boxed {
 
 fn bounds_of(points: &[[f32; 3]]) -> Bounds {
     points.iter().fold(Bounds::EMPTY, |bounds, point| bounds.union(&Bounds { low: *point, high: *point }))
+}
+
+fn roomy(bounds: &Bounds) -> Bounds {
+    let farthest = bounds.low.iter().chain(&bounds.high).fold(f32::MIN_POSITIVE, |most: f32, c| most.max(c.abs()));
+    let more = 1e-5 * farthest;
+    Bounds { low: bounds.low.map(|c| c - more), high: bounds.high.map(|c| c + more) }
 }
 
 struct Builder<'a> {
@@ -254,10 +263,10 @@ impl<'a, S: Simd> TriangleCaster<'a, S> {
 
     /// The first triangle that a ray meets from either side; any one where that is enough.
     #[inline(always)]
-    pub fn hit(&mut self, ray: &Ray, any: bool) -> Option<Met> {
-        let root = self.triangles.nodes.first()?;
-        let segment = Segment::new(ray, &[0.0; 3], root)?;
-        let boxes = BoxTest::new(self.simd, &segment, root);
+    pub fn hit(&mut self, ray: &Ray, any: bool) -> Option<TriangleHit> {
+        let room = self.triangles.room.as_ref()?;
+        let segment = Segment::new(ray, &[0.0; 3], room)?;
+        let boxes = BoxTest::new(self.simd, &segment, room);
         let sheared = Sheared::new(self.simd, &segment);
         let mut end = segment.length;
         let mut met = None;
@@ -280,7 +289,7 @@ impl<'a, S: Simd> TriangleCaster<'a, S> {
                 candidates &= candidates - 1;
                 if let Some(found) = exact(packet, lane, &segment, end) {
                     end = found.t;
-                    met = Some(Met {
+                    met = Some(TriangleHit {
                         t: segment.t_start + found.t,
                         triangle: self.triangles.ids[first + lane] as usize,
                         ..found
@@ -297,7 +306,7 @@ impl<'a, S: Simd> TriangleCaster<'a, S> {
 
 /// Where a line that passes through a triangle meets its plane, if within [0, `end`].
 #[inline(always)]
-fn exact(packet: &Packet, lane: usize, segment: &Segment, end: f64) -> Option<Met> {
+fn exact(packet: &Packet, lane: usize, segment: &Segment, end: f64) -> Option<TriangleHit> {
     let corner = |number: usize| -> [f64; 3] { std::array::from_fn(|axis| f64::from(packet.0[number][axis].0[lane])) };
     let first = corner(0);
     let (a, b) = (difference(corner(1), first), difference(corner(2), first));
@@ -310,9 +319,9 @@ fn exact(packet: &Packet, lane: usize, segment: &Segment, end: f64) -> Option<Me
     }
     // Cramer's rule (Möller and Trumbore 1997).
     let across = cross(segment.direction, toward);
-    let shares = [dot(across, b) / slope, -dot(across, a) / slope];
+    let shares = [-dot(across, b) / slope, dot(across, a) / slope];
     let length = dot(normal, normal).sqrt();
-    Some(Met { t, triangle: 0, normal: normal.map(|c| c / length), shares })
+    Some(TriangleHit { t, triangle: 0, normal: normal.map(|c| c / length), shares })
 }
 
 /// A ray in the space where it goes along z (Woop, Benthin, Wald 2013).
