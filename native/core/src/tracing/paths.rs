@@ -200,16 +200,14 @@ impl<'a, S: Simd> Tracer<'a, S> {
             let [x, y] = view.pixel_center(pixel % view.width, pixel / view.width);
             let depth = f64::from(surfaces.depth[pixel]);
             let aside = plus(right.map(|c| c * x), y, up);
-            let (origin, direction, t) = if view.is_perspective {
-                let way = plus(aside, 1.0, forward);
-                (view.eye, unit(way), depth * dot(way, way).sqrt())
-            } else {
-                (plus(view.eye, 1.0, aside), forward, depth)
-            };
+            let (origin, way) =
+                if view.is_perspective { (view.eye, plus(aside, 1.0, forward)) } else { (plus(view.eye, 1.0, aside), forward) };
+            let length = dot(way, way).sqrt();
+            let (direction, t) = (unit(way), depth * length);
             let error = depth_error(surfaces, self.scene, pixel, t);
             let path =
                 Path { pixel: index, seed: random::mixed(pixel as u32 + 1), reflections: 0, refractions: 0, is_straight: true };
-            let ray = Ray { origin, direction, t_min: t - error, t_max: t + error };
+            let ray = Ray { origin, direction, t_min: (t - error).max(view.clip[0] * length).min(t), t_max: t + error };
             self.flights.push(Flight { ray, light: [1.0; 3], path, medium: AIR, purpose: Purpose::Eye });
         }
     }
@@ -237,7 +235,7 @@ impl<'a, S: Simd> Tracer<'a, S> {
                 }
             }
             if flight.purpose == Purpose::Eye {
-                arrival = Some(as_found(surfaces, self.pixels[flight.path.pixel] as usize, &flight, arrival));
+                arrival = Some(as_found(surfaces, self.scene, self.pixels[flight.path.pixel] as usize, &flight, arrival));
             }
             self.land(flight, arrival);
         }
@@ -583,14 +581,14 @@ fn depth_error(surfaces: &Surfaces<'_>, scene: &Scene<'_>, pixel: usize, t: f64)
 }
 
 /// The surface of a pixel: where it was found again there, else where the image has it; with the image's colours.
-fn as_found(surfaces: &Surfaces<'_>, pixel: usize, flight: &Flight, again: Option<Arrival>) -> Arrival {
+fn as_found(surfaces: &Surfaces<'_>, scene: &Scene<'_>, pixel: usize, flight: &Flight, again: Option<Arrival>) -> Arrival {
     let (base, material) = (surfaces.color[pixel], surfaces.material[pixel] as u32);
     if let Some(arrival) = again {
         return Arrival { base, material, ..arrival };
     }
-    let Ray { t_min, t_max, .. } = flight.ray;
     let normal = unit(double(surfaces.normal[pixel]));
-    Arrival { t: 0.5 * (t_min + t_max), normal, geometric: normal, base, material, lift: 0.5 * (t_max - t_min) }
+    let lift = depth_error(surfaces, scene, pixel, flight.ray.t_max);
+    Arrival { t: flight.ray.t_max - lift, normal, geometric: normal, base, material, lift }
 }
 
 fn on_mesh(scene: &Scene<'_>, flight: &Flight, met: &TriangleHit) -> Arrival {
