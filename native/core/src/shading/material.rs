@@ -189,21 +189,22 @@ impl<S: Simd> Parameters<S> {
         self.transmission
     }
 
-    /// What of a light's irradiance is sent to the eye: by what is matt, and by facets.
+    /// What of a light's irradiance is sent to the eye: by what is matt, of which `matt` is seen through the surface, and by
+    /// facets.
     #[inline(always)]
     pub fn sent(&self, simd: S, point: &Facing<S>, matt: Triple<S>, toward: Triple<S>) -> [Triple<S>; 2] {
         let facing = point.normal.dot(toward).max(simd.splat(0.0));
         let between = unit(simd, point.to_eye + toward);
         let near = toward.dot(between);
-        let Met { reflected, entering } = self.meet(simd, near, point.base);
         let gloss = facets(simd, self.roughness, point.normal.dot(between), near, facing);
-        let diffuse = entering * facing * simd.splat(1.0 / PI);
-        [matt.scaled(diffuse), reflected.scaled(gloss)]
+        let reflected = self.meet(simd, near, simd.splat(1.0), point.base).reflected;
+        [matt.scaled(facing * simd.splat(1.0 / PI)), reflected.scaled(gloss)]
     }
 
-    /// What becomes of light at an angle to facets, given its cosine.
+    /// What becomes of light at an angle to facets, given its cosine. Of what they reflect a share is `shown`; the rest is hidden
+    /// by others, which metal reflects once more, on average over all angles.
     #[inline(always)]
-    pub fn meet(&self, simd: S, cosine: S::Vector, base: Triple<S>) -> Met<S> {
+    pub fn meet(&self, simd: S, cosine: S::Vector, shown: S::Vector, base: Triple<S>) -> Met<S> {
         let one = simd.splat(1.0);
         let cosine = cosine.max(simd.splat(1e-3)).min(one);
         let dielectric = self.fresnel(simd, cosine);
@@ -212,7 +213,8 @@ impl<S: Simd> Parameters<S> {
         let grazing = squared * squared * grazing;
         let mut reflected = base;
         for channel in &mut reflected.0 {
-            let metal = *channel + (one - *channel) * grazing;
+            let again = *channel + (one - *channel) * simd.splat(1.0 / 21.0);
+            let metal = (*channel + (one - *channel) * grazing) * (shown + (one - shown) * again);
             *channel = dielectric + self.metallic * (metal - dielectric);
         }
         Met { reflected, entering: (one - self.metallic) * (one - dielectric) }
@@ -280,9 +282,9 @@ pub fn shade<S: Simd>(
     base: Triple<S>,
 ) -> Shaded<S> {
     let parameters = Parameters::gathered(simd, scene.materials, material);
-    let matt = parameters.matt(simd, base);
-    let Met { reflected, entering } = parameters.meet(simd, normal.dot(to_eye), base);
-    let mut radiance = parameters.emission + (reflected + matt.scaled(entering)) * Triple::splat(simd, scene.world);
+    let Met { reflected, entering } = parameters.meet(simd, normal.dot(to_eye), simd.splat(1.0), base);
+    let matt = parameters.matt(simd, base).scaled(entering);
+    let mut radiance = parameters.emission + (reflected + matt) * Triple::splat(simd, scene.world);
     let point = Facing { normal, to_eye, base };
     for light in scene.lights {
         let (toward, irradiance) = shine(simd, light, position);

@@ -311,14 +311,14 @@ impl<'a, S: Simd> Tracer<'a, S> {
         };
         let mut parameters = Parameters::gathered(simd, self.scene.materials, &block.material);
         parameters.turn_inside_out(simd, simd.mask(block.within));
-        let matt = parameters.matt(simd, point.base);
-        let Met { reflected, entering } = parameters.meet(simd, simd.load(&block.cosine), point.base);
+        let Met { reflected, entering } = parameters.meet(simd, simd.load(&block.cosine), simd.load(&block.shown), point.base);
+        let matt = parameters.matt(simd, point.base).scaled(entering);
         let [r, g, b] = point.base.0;
         let zero = simd.splat(0.0);
         // A body takes its colour from light in two halves, where this comes in and where it goes out.
         let tint = Triple([r.max(zero).sqrt(), g.max(zero).sqrt(), b.max(zero).sqrt()]);
         let passing = rows::<S>(tint.scaled(entering * parameters.clear()));
-        let ambient = rows::<S>(matt.scaled(entering));
+        let ambient = rows::<S>(matt);
         let (reflected, emission) = (rows::<S>(reflected), rows::<S>(parameters.emission));
         for lane in 0..count {
             let vertex = self.vertices[start + lane];
@@ -505,6 +505,8 @@ struct Block {
     /// Normals of the facets that mirror and let pass, and the cosines of their angles to the eye.
     facet: [[f64; 3]; LANES],
     cosine: Lanes,
+    /// The share of what the facets mirror that others do not hide.
+    shown: Lanes,
 }
 
 impl Block {
@@ -517,6 +519,7 @@ impl Block {
             within: 0,
             facet: [[0.0; 3]; LANES],
             cosine: Lanes::splat(1.0),
+            shown: Lanes::splat(1.0),
         };
         for (lane, vertex) in vertices.iter().enumerate() {
             let to_eye = vertex.flight.ray.direction.map(|c| -c);
@@ -529,6 +532,9 @@ impl Block {
             let is_smooth = roughness <= 0.0 || vertex.flight.purpose == Purpose::Shadow;
             block.facet[lane] = if is_smooth { vertex.arrival.normal } else { facet(vertex, to_eye, roughness, sample) };
             block.cosine.0[lane] = dot(block.facet[lane], to_eye) as f32;
+            if !is_smooth {
+                block.shown.0[lane] = shown(vertex, block.facet[lane], roughness) as f32;
+            }
         }
         block
     }
@@ -541,6 +547,23 @@ fn facet(vertex: &Vertex, to_eye: [f64; 3], roughness: f32, sample: u32) -> [f64
     let local = [dot(to_eye, right), dot(to_eye, up), dot(to_eye, normal).max(1e-6)];
     let point = random::square(random::branch(vertex.flight.path.seed, FACET), sample);
     along(normal, random::facet(unit(local), alpha(roughness), point))
+}
+
+/// The share of what a facet mirrors that others do not hide, of those that are seen (Smith; Heitz 2014).
+fn shown(vertex: &Vertex, facet: [f64; 3], roughness: f32) -> f64 {
+    let direction = vertex.flight.ray.direction;
+    let normal = vertex.arrival.normal;
+    let mirrored = dot(plus(direction, -2.0 * dot(direction, facet), facet), normal);
+    if mirrored <= 0.0 {
+        return 0.0;
+    }
+    let squared = alpha(roughness).powi(2);
+    let hidden = |cosine: f64| {
+        let cosine_squared = cosine.clamp(1e-3, 1.0).powi(2);
+        0.5 * ((1.0 + squared * (1.0 - cosine_squared) / cosine_squared).sqrt() - 1.0)
+    };
+    let seen = 1.0 + hidden(-dot(direction, normal));
+    seen / (seen + hidden(mirrored))
 }
 
 /// The width of the facets' distribution.

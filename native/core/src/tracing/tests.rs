@@ -179,7 +179,7 @@ impl Task for Reflectance {
         let mut parameters = Parameters::gathered(simd, &[material], &[0; LANES]);
         parameters.turn_inside_out(simd, simd.mask(if self.from_within { u16::MAX } else { 0 }));
         let white = Triple::splat(simd, [1.0; 3]);
-        parameters.meet(simd, simd.load(&Lanes(self.cosines)), white).reflected.0[0].lanes().0
+        parameters.meet(simd, simd.load(&Lanes(self.cosines)), simd.splat(1.0), white).reflected.0[0].lanes().0
     }
 }
 
