@@ -20,6 +20,7 @@ _HOMES = {
     "FittedBvh": ".addon.render.fitted_bvh",
     "ImageBuffers": ".addon.fluid.image",
     "Look": ".addon.fluid.look",
+    "Tracing": ".addon.fluid.tracing",
     "MeniscusError": ".addon.fluid.errors",
     "methods": ".addon.render.registry",
     "oracle": ".addon.render.oracle",
