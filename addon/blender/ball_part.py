@@ -33,7 +33,7 @@ class BallPart:
     source
         Index of the object.
     world_from_object
-        (4, 4) float64: the object's place, where `velocities` do not know of the motion of that; None where they do.
+        (4, 4) float64: the object's place, where it may move and `velocities` do not know of that; None elsewhere.
     """
 
     positions: FloatArray

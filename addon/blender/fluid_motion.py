@@ -12,12 +12,14 @@ from .ball_part import BallPart, FloatArray, transformed_points
 from .read_scene import FluidParts
 
 
-def needs_neighbors(fluid: FluidParts, anything_moves: bool) -> bool:
-    """Whether the frames before and after tell more of the velocities, where objects move or not."""
-    return any(part.velocities is None or (anything_moves and part.world_from_object is not None) for part in fluid.parts)
+def needs_neighbors(fluid: FluidParts) -> bool:
+    """Whether the frames before and after tell more of the velocities."""
+    return any(part.velocities is None or part.world_from_object is not None for part in fluid.parts)
 
 
-def with_motion(fluid: FluidParts, before: FluidParts | None, after: FluidParts | None, seconds: float) -> FluidParts:
+def with_motion(
+    fluid: FluidParts, before: FluidParts | None, after: FluidParts | None, seconds: tuple[float, float]
+) -> FluidParts:
     """The same fluid with all velocities.
 
     Parts without velocities get those that the positions of the same balls say (:func:`ball_motion.matched_positions`), the
@@ -29,7 +31,7 @@ def with_motion(fluid: FluidParts, before: FluidParts | None, after: FluidParts 
     before, after
         The fluid in the neighbouring frames; None where unknown.
     seconds
-        From one frame to the next.
+        From before to now, and from now to after.
     """
     sides = [_same_parts(fluid, other) for other in (before, after)]
     parts = tuple(_moving(part, was, will, seconds) for part, was, will in zip(fluid.parts, *sides, strict=True))
@@ -58,7 +60,7 @@ def _by_source(fluid: FluidParts) -> defaultdict[str, list[BallPart]]:
     return found
 
 
-def _moving(part: BallPart, before: BallPart | None, after: BallPart | None, seconds: float) -> BallPart:
+def _moving(part: BallPart, before: BallPart | None, after: BallPart | None, seconds: tuple[float, float]) -> BallPart:
     if part.velocities is None:
         was, will = _positions_in(part, before), _positions_in(part, after)
         return replace(part, velocities=velocities_between(part.positions, was, will, seconds))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import bpy
 import numpy as np
@@ -12,9 +13,13 @@ import numpy.typing as npt
 from ..fluid.lighting import Material
 from ..fluid.meshes import Meshes, MeshObject, MeshPart
 from ..fluid.turning import turned
+from .ball_part import FloatArray, transformed_points
+from .moving import may_move
 from .read_materials import read_material
 from .read_particles import has_particle_systems
 from .visible_sources import ShownTest, settings_of, shown_in_render, shown_in_viewport
+
+Read = TypeVar("Read")
 
 _WITH_SURFACE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have a surface, or can have a mesh made of it."""
@@ -40,6 +45,50 @@ def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D 
         for instance in _shown_instances(depsgraph, viewport):
             collected.add(instance)
     return collected.meshes()
+
+
+def read_moved_vertices(depsgraph: bpy.types.Depsgraph, meshes: Meshes) -> FloatArray | None:
+    """Where the vertices of meshes that were read in another frame are in the current one.
+
+    Only what may move is read. What is not there, or has other numbers of vertices or triangles, stands still.
+
+    Parameters
+    ----------
+    depsgraph
+        The dependency graph that `meshes` were read from.
+
+    Returns
+    -------
+    (V, 3) float32, world space; None where all are where they were.
+
+    Raises
+    ------
+    InputError
+        As for :func:`read_meshes`.
+    """
+    parts = {part.key: part for part in meshes.parts}
+    positions = _EachOnce(_read_positions)
+    vertices = meshes.vertices.copy()
+    for instance in _shown_instances(depsgraph, None):
+        part = parts.get(_key_of(instance))
+        if part is None or not _may_have_moved(instance, part, depsgraph.scene):
+            continue
+        found, place = positions.of(instance.object), np.array(instance.matrix_world, np.float64)
+        if found is not None and found.counts == (part.vertex_count, part.triangle_count):
+            vertices[part.first_vertex :][: part.vertex_count] = transformed_points(found.vertices, place)
+    return None if np.array_equal(vertices, meshes.vertices) else vertices
+
+
+def _may_have_moved(instance: bpy.types.DepsgraphObjectInstance, part: MeshPart, scene: bpy.types.Scene) -> bool:
+    is_elsewhere = not np.array_equal(np.array(instance.matrix_world, np.float64), part.world_from_object)
+    return is_elsewhere or may_move(instance.object, scene)
+
+
+def _key_of(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
+    """What names an instance, or an object itself, in all frames."""
+    if not instance.is_instance:
+        return instance.object.name_full
+    return instance.object.name_full, instance.parent.name_full, tuple(instance.persistent_id)
 
 
 def _shown_instances(
@@ -98,22 +147,6 @@ def _is_fluid(instance: bpy.types.DepsgraphObjectInstance, item: bpy.types.Objec
     return bool(settings.use_fluid) and fluid_replaces_surface(item, settings)
 
 
-def may_move(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """Whether an object, or the surface that it has, may be elsewhere in other frames; as Cycles decides it.
-
-    Parameters
-    ----------
-    item
-        Evaluated.
-    scene
-        The original scene.
-    """
-    has_animation = item.animation_data or item.constraints or item.rigid_body or item.particle_systems
-    if has_animation or getattr(item.data, "animation_data", None) or item.is_deform_modified(scene, "RENDER"):
-        return True
-    return item.parent is not None and may_move(item.parent, scene)
-
-
 def fluid_replaces_surface(item: bpy.types.Object, settings: bpy.types.PropertyGroup) -> bool:
     """Whether the fluid of a source, with the given ``meniscus`` properties, takes the place of its own surface."""
     is_domain = any(modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" for modifier in item.modifiers)
@@ -130,41 +163,79 @@ class _MeshArrays:
     slots: npt.NDArray[np.int32]
 
 
+@dataclass(frozen=True)
+class _Positions:
+    """Where the vertices of a mesh are in its own space, (V, 3), and the numbers of vertices and triangles."""
+
+    vertices: FloatArray
+    counts: tuple[int, int]
+
+
+@dataclass
+class _EachOnce(Generic[Read]):
+    """Reads the meshes of objects, each mesh once, however often it is instanced."""
+
+    read: Callable[[bpy.types.Mesh], Read]
+    known: dict[int, Read] = field(default_factory=dict)
+
+    def of(self, item: bpy.types.Object) -> Read | None:
+        """What an object's mesh is read as; None where it has no surface."""
+        # A mesh in edit mode seems empty, a copy does not.
+        if isinstance(item.data, bpy.types.Mesh) and not item.data.is_editmode:
+            key = item.data.as_pointer()
+            if key not in self.known:
+                self.known[key] = self.read(item.data)
+            return self.known[key]
+        if item.type not in _WITH_SURFACE:
+            return None
+        try:
+            mesh = item.to_mesh()
+            return None if mesh is None else self.read(mesh)
+        finally:
+            item.to_mesh_clear()
+
+
 @dataclass
 class _Collected:
-    """Surfaces as they come; each mesh is read once, however often it is instanced."""
+    """Surfaces as they come."""
 
     view_layer: bpy.types.ViewLayer
-    known: dict[int, _MeshArrays] = field(default_factory=dict)
+    arrays: _EachOnce[_MeshArrays] = field(default_factory=lambda: _EachOnce(_read_mesh))
     parts: list[tuple[_MeshArrays, npt.NDArray[np.int32], npt.NDArray[np.int32]]] = field(default_factory=list)
     names: list[MeshPart] = field(default_factory=list)
+    vertex_count: int = 0
     objects: dict[MeshObject, int] = field(default_factory=dict)
     materials: dict[Material, int] = field(default_factory=dict)
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Take the surface of an instance, if it has one."""
         item = instance.object
-        arrays = self._arrays(item)
+        arrays = self.arrays.of(item)
         if arrays is None or not len(arrays.triangles):
             return
         owner = (instance.parent if instance.is_instance else item).original
         known = MeshObject(item.name, item.pass_index, item.is_holdout or owner.holdout_get(view_layer=self.view_layer))
         index = self.objects.setdefault(known, len(self.objects))
         slots = np.array([self._material(material) for material in self._materials_of(item)], np.int32)
-        placed = _placed(arrays, np.array(instance.matrix_world, np.float64))
+        place = np.array(instance.matrix_world, np.float64)
+        placed = _placed(arrays, place)
         materials = slots[np.clip(arrays.slots, 0, len(slots) - 1)]
         self.parts.append((placed, np.full(len(materials), index, np.int32), materials))
-        key = item.name_full, owner.name_full, tuple(instance.persistent_id) if instance.is_instance else ()
-        self.names.append(MeshPart(key, len(placed.vertices), len(placed.triangles)))
+        counts = len(placed.vertices), len(placed.triangles)
+        self.names.append(MeshPart(_key_of(instance), self.vertex_count, *counts, place))
+        self.vertex_count += counts[0]
 
     def meshes(self) -> Meshes:
         """All together."""
-        counts = [len(arrays.vertices) for arrays, _, _ in self.parts]
-        starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int32) if counts else ()
         return Meshes(
             vertices=_joined([arrays.vertices for arrays, _, _ in self.parts], (0, 3), np.float32),
             triangles=_joined(
-                [arrays.triangles + start for (arrays, _, _), start in zip(self.parts, starts, strict=True)], (0, 3), np.int32
+                [
+                    arrays.triangles + np.int32(part.first_vertex)
+                    for (arrays, _, _), part in zip(self.parts, self.names, strict=True)
+                ],
+                (0, 3),
+                np.int32,
             ),
             normals=_joined([arrays.normals for arrays, _, _ in self.parts], (0, 3, 3), np.float32),
             object=_joined([objects for _, objects, _ in self.parts], (0,), np.int32),
@@ -182,21 +253,6 @@ class _Collected:
     def _material(self, material: bpy.types.Material | None) -> int:
         return self.materials.setdefault(read_material(material), len(self.materials))
 
-    def _arrays(self, item: bpy.types.Object) -> _MeshArrays | None:
-        # A mesh in edit mode seems empty, a copy does not.
-        if isinstance(item.data, bpy.types.Mesh) and not item.data.is_editmode:
-            key = item.data.as_pointer()
-            if key not in self.known:
-                self.known[key] = _read_mesh(item.data)
-            return self.known[key]
-        if item.type not in _WITH_SURFACE:
-            return None
-        try:
-            mesh = item.to_mesh()
-            return None if mesh is None else _read_mesh(mesh)
-        finally:
-            item.to_mesh_clear()
-
 
 def _read_mesh(mesh: bpy.types.Mesh) -> _MeshArrays:
     """The arrays of a mesh, from its attributes where there are some: other properties take a hundred times as long."""
@@ -209,6 +265,14 @@ def _read_mesh(mesh: bpy.types.Mesh) -> _MeshArrays:
     vertex_of_corner = _values(mesh.attributes[".corner_vert"].data, "value", (len(mesh.loops),), np.int32)
     normals = _values(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
     return _MeshArrays(vertices, vertex_of_corner[corners], normals[corners], _triangle_slots(mesh))
+
+
+def _read_positions(mesh: bpy.types.Mesh) -> _Positions:
+    if not len(mesh.vertices):  # it may have no attributes
+        return _Positions(np.empty((0, 3), np.float32), (0, 0))
+    vertices = _values(mesh.attributes["position"].data, "vector", (len(mesh.vertices), 3), np.float32)
+    # A face of n corners makes n - 2 triangles.
+    return _Positions(vertices, (len(vertices), len(mesh.loops) - 2 * len(mesh.polygons)))
 
 
 def _triangle_corners(mesh: bpy.types.Mesh) -> npt.NDArray[np.int32]:
@@ -244,7 +308,7 @@ def _placed(arrays: _MeshArrays, world_from_object: npt.NDArray[np.float64]) -> 
     cofactors /= np.abs(cofactors).max() or 1.0
     normals = turned(arrays.normals.reshape(-1, 3), cofactors.astype(np.float32))
     normals /= np.maximum(np.sqrt(np.einsum("ij,ij->i", normals, normals)), np.float32(1e-30))[:, None]
-    vertices = turned(arrays.vertices, axes.astype(np.float32)) + world_from_object[:3, 3].astype(np.float32)
+    vertices = transformed_points(arrays.vertices, world_from_object)
     return _MeshArrays(vertices, arrays.triangles, normals.reshape(-1, 3, 3), arrays.slots)
 
 

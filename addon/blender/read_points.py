@@ -60,7 +60,7 @@ def _read_geometry(source: Source, data: bpy.types.Mesh | bpy.types.PointCloud) 
             colors=_colors(source, data),
             velocities=None if velocities is None else transformed_vectors(velocities, move),
             ids=_attribute(data, "id", _INTEGER_TYPES),
-            world_from_object=move,
+            world_from_object=move if source.place_may_move else None,
         )
     ]
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -31,11 +32,13 @@ from ..render.renderer import render
 from ..render.sample_mean import SampleMean
 from ..render.samples import sample_offset
 from ..render.surroundings import Backdrop, Motion
+from .ball_part import FloatArray
 from .fluid_motion import needs_neighbors, with_motion
+from .moving import may_move
 from .preferences import backend_of, threads_of
 from .read_camera import read_camera
 from .read_materials import read_lighting
-from .read_meshes import may_move, read_meshes
+from .read_meshes import read_meshes, read_moved_vertices
 from .read_scene import Fluid, FluidParts, read_field, read_look, read_parts
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 
@@ -163,7 +166,10 @@ class _Neighbor:
 
     camera: Camera | None = None
     fluid: FluidParts | None = None
-    meshes: Meshes | None = None
+    vertices: FloatArray | None = None
+
+
+_Neighbors = tuple[_Neighbor, _Neighbor]
 
 
 @dataclass(frozen=True)
@@ -275,9 +281,7 @@ def read_view_layer(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, se
     """
     milliseconds: dict[str, float] = {}
     with timed(milliseconds, "read"):
-        reader = _Reader(depsgraph, settings, set_frame)
-        moment, motion = reader.moving_moment()
-        return SceneRender(settings, moment, motion, reader.shutter(), milliseconds)
+        return SceneRender(settings, *_Reader(depsgraph, settings, set_frame).read(), milliseconds)
 
 
 @dataclass(frozen=True)
@@ -290,26 +294,31 @@ class _Reader:
     def _scene(self) -> bpy.types.Scene:
         return self.depsgraph.scene_eval  # animated settings reach only this one
 
-    def moment(self) -> _Moment:
-        """What there is to be seen now."""
-        return self._moment_of(self._fluid().joined(), self._meshes())
-
-    def moving_moment(self) -> tuple[_Moment, Motion | None]:
-        """The same, with the velocities of all fluid and the motion of all else, for those passes that ask for it."""
+    def read(self) -> tuple[_Moment, Motion | None, tuple[_Moment, ...]]:
+        """What there is to be seen now, how it moves where passes ask for that, and what is seen while the shutter is open."""
         fluid, meshes = self._fluid(), self._meshes()
-        before, after = self._neighbors(fluid, meshes)
-        render = self._scene.render
-        seconds = render.fps_base / render.fps
-        if before.fluid is not None or after.fluid is not None:
-            fluid = with_motion(fluid, before.fluid, after.fluid, seconds)
-        moment = self._moment_of(fluid.joined(), meshes)
+        with self._other_times() as set_time:
+            neighbors = self._neighbors(fluid, meshes, set_time)
+            shutter = self._shutter(neighbors, set_time)
+        moment = self._moment_of(self._moving(fluid, neighbors), meshes)
+        return moment, self._motion(moment.camera, neighbors), shutter
+
+    def _moving(self, fluid: FluidParts, neighbors: _Neighbors, time: float = 0.0) -> Fluid:
+        """Fluid that was read so many frames from now, all of it with velocities if its neighbours are known."""
+        before, after = (neighbor.fluid for neighbor in neighbors)
+        if before is not None or after is not None:
+            fluid = with_motion(fluid, before, after, ((1 + time) * self._frame_seconds, (1 - time) * self._frame_seconds))
+        return fluid.joined()
+
+    def _motion(self, camera: Camera, neighbors: _Neighbors) -> Motion | None:
         if "vector" not in self.settings.passes:
-            return moment, None
-        previous, following = (moment.camera if other.camera is None else other.camera for other in (before, after))
-        vertices = (
-            None if meshes is None or other.meshes is None else meshes.vertices_in(other.meshes) for other in (before, after)
-        )
-        return moment, Motion(previous, following, seconds, *vertices)
+            return None
+        cameras = (camera if neighbor.camera is None else neighbor.camera for neighbor in neighbors)
+        return Motion(*cameras, self._frame_seconds, *(neighbor.vertices for neighbor in neighbors))
+
+    @property
+    def _frame_seconds(self) -> float:
+        return float(self._scene.render.fps_base / self._scene.render.fps)
 
     def _moment_of(self, fluid: Fluid, meshes: Meshes | None) -> _Moment:
         """What there is to be seen now, with fluid and meshes that are read already."""
@@ -335,22 +344,19 @@ class _Reader:
     def _meshes(self) -> Meshes | None:
         return read_meshes(self.depsgraph) if self._scene.meniscus.render_meshes != "NONE" else None
 
-    def _neighbors(self, fluid: FluidParts, meshes: Meshes | None) -> tuple[_Neighbor, _Neighbor]:
-        """What moves, one frame before and one frame after."""
+    def _neighbors(self, fluid: FluidParts, meshes: Meshes | None, set_time: Callable[[float], None]) -> _Neighbors:
+        """What may move, one frame before and one frame after."""
         needs_vectors = "vector" in self.settings.passes
-        needs_velocities = "velocity" in needed_attributes(self.settings.passes, self._look())
-        objects_move = (needs_vectors or needs_velocities) and self._objects_move
         readers: dict[str, Callable[[], Any]] = {}
-        if needs_vectors and self._camera_moves:
+        if needs_vectors and self._camera_may_move:
             readers["camera"] = self._camera
-        if needs_velocities and needs_neighbors(fluid, objects_move):
+        if self._needs_velocities(self.settings.passes) and needs_neighbors(fluid):
             readers["fluid"] = self._fluid
-        if needs_vectors and objects_move and meshes is not None and len(meshes):
-            readers["meshes"] = self._meshes
+        if needs_vectors and meshes is not None and len(meshes) and self._objects_may_move:
+            readers["vertices"] = partial(read_moved_vertices, self.depsgraph, meshes)
         if not readers:
             return _Neighbor(), _Neighbor()
-        with self._other_times() as set_time:
-            return self._neighbor(-1, set_time, readers), self._neighbor(1, set_time, readers)
+        return self._neighbor(-1, set_time, readers), self._neighbor(1, set_time, readers)
 
     def _neighbor(self, step: float, set_time: Callable[[float], None], readers: dict[str, Callable[[], Any]]) -> _Neighbor:
         set_time(step)
@@ -361,7 +367,10 @@ class _Reader:
                 found[name] = read()
         return _Neighbor(**found)
 
-    def shutter(self) -> tuple[_Moment, ...]:
+    def _needs_velocities(self, passes: tuple[str, ...]) -> bool:
+        return "velocity" in needed_attributes(passes, self._look())
+
+    def _shutter(self, neighbors: _Neighbors, set_time: Callable[[float], None]) -> tuple[_Moment, ...]:
         """What is seen while the shutter is open; nothing without motion blur."""
         render = self._scene.render
         if not (render.use_motion_blur and render.motion_blur_shutter > 0 and self.settings.mean_passes):
@@ -369,20 +378,21 @@ class _Reader:
         steps = min(self.settings.samples, MOST_STEPS)
         start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
         times = [(start + (step + 0.5) / steps) * render.motion_blur_shutter for step in range(steps)]
-        with self._other_times() as set_time:
-            return tuple(self._moment_at(time, set_time) for time in times)
+        return tuple(self._moment_at(time, neighbors, set_time) for time in times)
+
+    def _moment_at(self, time: float, neighbors: _Neighbors, set_time: Callable[[float], None]) -> _Moment:
+        set_time(time)
+        fluid, needs_velocities = self._fluid(), self._needs_velocities(self.settings.mean_passes)
+        return self._moment_of(self._moving(fluid, neighbors, time) if needs_velocities else fluid.joined(), self._meshes())
 
     @property
-    def _camera_moves(self) -> bool:
-        """Whether the camera may be elsewhere in other frames."""
+    def _camera_may_move(self) -> bool:
         camera = self.settings.camera or self.depsgraph.scene.camera
-        return camera is not None and bool(
-            camera.animation_data or camera.parent or camera.constraints or camera.data.animation_data
-        )
+        return camera is not None and may_move(camera.evaluated_get(self.depsgraph), self.depsgraph.scene)
 
     @property
-    def _objects_move(self) -> bool:
-        """Whether anything but cameras and lights may be elsewhere in other frames."""
+    def _objects_may_move(self) -> bool:
+        """Whether anything but cameras and lights may."""
         scene = self.depsgraph.scene
         objects = (item for item in self.depsgraph.ids if isinstance(item, bpy.types.Object))
         return any(may_move(item, scene) for item in objects if item.type not in {"CAMERA", "LIGHT"})
@@ -390,20 +400,20 @@ class _Reader:
     def _camera(self) -> Camera:
         return read_camera(self.depsgraph, self.settings.camera, self.settings.resolution)
 
-    def _moment_at(self, step: float, set_time: Callable[[float], None]) -> _Moment:
-        set_time(step)
-        return self.moment()
-
     @contextmanager
     def _other_times(self) -> Iterator[Callable[[float], None]]:
         """Gives a function that brings the dependency graph so many frames from now; in the end it is brought back."""
         now = self._scene.frame_current + self._scene.frame_subframe
+        has_left = False
 
         def set_time(step: float) -> None:
+            nonlocal has_left
+            has_left = True
             frame = math.floor(now + step)
             self.set_frame(frame, now + step - frame)
 
         try:
             yield set_time
         finally:
-            set_time(0.0)
+            if has_left:
+                set_time(0.0)

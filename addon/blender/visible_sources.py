@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.errors import InputError
+from .moving import place_may_move
 
 
 class NoSourceError(InputError):
@@ -39,12 +40,15 @@ class Source:
         Its geometry, or the further geometry that its modifiers make; None for objects without data.
     world_from_object
         (4, 4) float64, of this place; that of an instance differs from the object's own.
+    place_may_move
+        Whether it may be elsewhere in other frames.
     """
 
     object: bpy.types.Object
     settings: bpy.types.PropertyGroup
     data: bpy.types.ID | None
     world_from_object: npt.NDArray[np.float64]
+    place_may_move: bool
 
     @property
     def is_object_itself(self) -> bool:
@@ -135,14 +139,19 @@ def _places(depsgraph: bpy.types.Depsgraph, fluid: set[int]) -> Iterator[tuple[S
     if not any(_may_instance_fluid(item, depsgraph) for item in depsgraph.objects):
         for item in depsgraph.objects:
             if item.as_pointer() in fluid:
-                yield Source(item, settings_of(item, depsgraph), item.data, np.array(item.matrix_world, np.float64)), item
+                place = np.array(item.matrix_world, np.float64)
+                may_move = place_may_move(item, depsgraph.scene)
+                yield Source(item, settings_of(item, depsgraph), item.data, place, may_move), item
         return
     for instance in depsgraph.object_instances:
         item = instance.instance_object if instance.is_instance else instance.object
         if item.as_pointer() in fluid:
+            owner = instance.parent if instance.is_instance else item
             place = np.array(instance.matrix_world, np.float64)
-            source = Source(item, settings_of(item, depsgraph), instance.object.data, place)
-            yield source, instance.parent if instance.is_instance else item
+            # Further geometry of an object stands where that does; other instances may be moved by whatever makes them.
+            is_own = owner == item and np.array_equal(place, np.array(item.matrix_world, np.float64))
+            may_move = not is_own or place_may_move(item, depsgraph.scene)
+            yield Source(item, settings_of(item, depsgraph), instance.object.data, place, may_move), owner
 
 
 def _may_instance_fluid(item: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from itertools import accumulate
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +31,7 @@ class MeshObject:
     is_holdout: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshPart:
     """One mesh at one place among many.
 
@@ -40,13 +39,19 @@ class MeshPart:
     ----------
     key
         What names it in all frames.
-    vertex_count, triangle_count
+    first_vertex, vertex_count
+        Its vertices among those of all.
+    triangle_count
         How many it has.
+    world_from_object
+        (4, 4) float64: its place.
     """
 
     key: Hashable
+    first_vertex: int
     vertex_count: int
     triangle_count: int
+    world_from_object: npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ class Meshes:
     objects, materials
         What the triangles belong to.
     parts
-        Which follow one another in the arrays; none where meshes of several frames need not be told apart.
+        What the vertices belong to; none where meshes of several frames need not be told apart.
 
     Raises
     ------
@@ -109,21 +114,3 @@ class Meshes:
 
     def __len__(self) -> int:
         return len(self.triangles)
-
-    def vertices_in(self, other: Meshes) -> npt.NDArray[np.float32] | None:
-        """(V, 3) float32: where the vertices are in another frame; None where all are where they are.
-
-        Parts that are not there, or have other numbers of vertices or triangles, stand still.
-        """
-        there = dict(zip(other.parts, _starts(other.parts), strict=True))
-        vertices = self.vertices.copy()
-        for part, start in zip(self.parts, _starts(self.parts), strict=True):
-            found = there.get(part)
-            if found is not None:
-                vertices[start : start + part.vertex_count] = other.vertices[found : found + part.vertex_count]
-        return None if np.array_equal(vertices, self.vertices) else vertices
-
-
-def _starts(parts: tuple[MeshPart, ...]) -> list[int]:
-    """The first vertex of each part."""
-    return list(accumulate((part.vertex_count for part in parts), initial=0))[:-1]

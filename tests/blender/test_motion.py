@@ -5,9 +5,9 @@ import importlib
 import bpy
 import numpy as np
 import pytest
-from fluid_scenes import GRID_POINTS, add_object, add_points, store
+from fluid_scenes import GRID_POINTS, add_geometry_nodes, add_object, add_points, instance_collection, store
 
-SECONDS = 0.5
+SECONDS = 0.5, 0.5
 UP = np.array((0, 0, 1), np.float32)
 
 
@@ -30,19 +30,29 @@ def scene(empty_scene):
 
 
 @pytest.fixture
-def read(module, scene):
-    """Reads the scene for some passes; gives the velocities of its balls, its motion, and the frames that were asked for."""
+def read_all(module, scene):
+    """Reads the scene for some passes; gives what was read, and the frames that were asked for."""
     render_scene = module("render_scene")
 
-    def read_for(*passes):
+    def read_for(*passes, **settings):
         frames = []
 
         def set_frame(frame, subframe):
             frames.append(frame + subframe)
             scene.frame_set(frame, subframe=subframe)
 
-        settings = render_scene.RenderSettings(passes)
-        found = render_scene.read_view_layer(bpy.context.evaluated_depsgraph_get(), settings, set_frame)
+        settings = render_scene.RenderSettings(passes, **settings)
+        return render_scene.read_view_layer(bpy.context.evaluated_depsgraph_get(), settings, set_frame), frames
+
+    return read_for
+
+
+@pytest.fixture
+def read(read_all):
+    """The same; gives the velocities of the balls, the motion, and the frames."""
+
+    def read_for(*passes):
+        found, frames = read_all(*passes)
         return found.moment.fluid.balls.velocities, found.motion, frames
 
     return read_for
@@ -53,6 +63,11 @@ def animate(item, path, values):
     for frame, value in enumerate(values, 4):
         setattr(item, path, value)
         item.keyframe_insert(path, frame=frame)
+
+
+def _curves(item):
+    action = item.animation_data.action
+    return action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
 
 
 def add_cube(scene):
@@ -93,6 +108,56 @@ def test_velocities_are_those_of_points_and_of_their_object(scene, read):
     np.testing.assert_allclose(read("velocity")[0], turning + (1, 0, 0) + 2 * UP, atol=1e-5)
 
 
+def test_velocities_of_an_object_that_stands_still_are_enough(scene, read):
+    """Whatever else moves, and changes."""
+    points = scene.objects["Points"]
+    store(points.data, "velocity", "FLOAT_VECTOR", "vector", [UP] * 4)
+    _, (to_points,) = add_geometry_nodes(
+        points, "GeometryNodeMeshToPoints"
+    )  # further geometry, which Blender lists as an instance
+    to_points.inputs["Radius"].default_value = 0.5
+    animate(add_cube(scene), "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
+    scene.frame_set(5)
+    velocities, _, frames = read("velocity")
+    np.testing.assert_array_equal(velocities, [UP] * 4)
+    assert frames == []
+
+
+def test_velocities_of_instances_are_those_of_points_and_of_what_makes_them(scene, read):
+    group = bpy.data.collections.new("Group")
+    points = add_points(group, "Instanced")
+    store(points.data, "velocity", "FLOAT_VECTOR", "vector", [(1, 0, 0)] * 4)
+    scene.objects["Points"].meniscus.use_fluid = False
+    animate(instance_collection(scene, group), "location", [(0, 0, -3), (0, 0, 0), (0, 0, 1)])
+    scene.frame_set(5)
+    np.testing.assert_allclose(read("velocity")[0], [(1, 0, 2)] * 4, atol=1e-5)
+
+
+@pytest.mark.parametrize("has_neighbors", [True, False], ids=["", "after only"])
+def test_a_look_of_speeds_has_them_while_the_shutter_is_open(scene, read_all, has_neighbors):
+    points = scene.objects["Points"]
+    animate(points, "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
+    for curve in _curves(points):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    if not has_neighbors:
+        points.meniscus.radius_attribute = "Missing"
+        animate(points.meniscus, "radius_mode", ["ATTRIBUTE", "FIXED", "FIXED"])
+    render = scene.render
+    render.use_motion_blur, render.motion_blur_shutter, render.motion_blur_position = True, 0.5, "START"
+    scene.meniscus.render_style = "speed"
+    scene.frame_set(5)
+    found, frames = read_all("combined", samples=2)
+    assert frames == [4, 6, 5.125, 5.375, 5]
+    expected = 2 * UP if has_neighbors else 3 * UP
+    for moment in (found.moment, *found.shutter):
+        np.testing.assert_allclose(moment.fluid.balls.velocities, [expected] * 4, atol=1e-4)
+    scene.meniscus.render_style = "headlight"
+    found, frames = read_all("combined", samples=2)
+    assert frames == [5.125, 5.375, 5]
+    assert found.shutter[0].fluid.balls.velocities is None
+
+
 @pytest.mark.parametrize(("lacking", "expected"), [((4,), 3), ((6,), 1)])
 def test_a_neighbour_that_cannot_be_read_does_not_count(scene, read, lacking, expected):
     points = scene.objects["Points"]
@@ -130,6 +195,21 @@ def test_meshes_move_part_by_part(scene, read):
     )
     assert before == [1, 0, 1, 1]
     assert after == [1, 4, 4, 4]
+
+
+def test_of_meshes_only_those_are_read_again_that_may_move(scene, read, module, monkeypatch):
+    reader, names = module("read_meshes"), []
+    read_positions = reader._read_positions
+    monkeypatch.setattr(reader, "_read_positions", lambda mesh: names.append(mesh.name) or read_positions(mesh))
+    add_cube(scene).data.name = "Still"
+    moving = add_cube(scene)
+    moving.data.name = "Moving"
+    animate(moving, "location", [(0, 0, 0), (0, 0, 1), (0, 0, 4)])
+    scene.frame_set(5)
+    _, motion, _ = read("vector")
+    assert names == ["Moving", "Moving"]
+    heights = motion.following_vertices[:, 2].reshape(-1, 8).mean(axis=1)
+    assert sorted(heights.round(3)) == [0, 4]
 
 
 def _moving_light(scene):

@@ -11,7 +11,7 @@ import meniscus
 from meniscus.addon.fluid.camera import Region, Window
 from meniscus.addon.fluid.errors import CancelledError, InputError
 from meniscus.addon.fluid.lighting import Light, Lighting, Material
-from meniscus.addon.fluid.meshes import Meshes, MeshObject, MeshPart
+from meniscus.addon.fluid.meshes import Meshes, MeshObject
 from meniscus.addon.fluid.passes import DEPTH_BACKGROUND
 from meniscus.addon.render.backdrop import backdrop
 from meniscus.addon.render.surroundings import Motion
@@ -188,18 +188,6 @@ def test_vertices_that_move_take_what_is_seen_along(camera):
     assert not found.to_following[~is_seen].any()
     assert found.to_previous is None
     assert seen(meshes, camera).to_following is None
-
-
-def test_vertices_are_found_in_another_frame_part_by_part():
-    def meshes(*heights, parts):
-        corners = [np.full((3, 3), height, float) for height in heights]
-        return replace(meshes_of(corners), parts=tuple(parts))
-
-    now = meshes(0, 1, 2, 3, parts=[MeshPart("a", 3, 1), MeshPart("b", 6, 2), MeshPart("c", 3, 1)])
-    other = meshes(7, 8, 9, parts=[MeshPart("c", 3, 1), MeshPart("b", 3, 1), MeshPart("a", 3, 1)])
-    np.testing.assert_array_equal(now.vertices_in(other)[::3, 0], [9, 1, 2, 7])
-    assert now.vertices_in(replace(now)) is None
-    assert now.vertices_in(meshes(7, parts=[MeshPart("d", 3, 1)])) is None
 
 
 def test_nothing_gives_the_background():

@@ -40,4 +40,13 @@ def test_differences_are_central_or_one_sided():
     before = np.array([(-1, 0, 0), (-1, 0, 2), NAN, NAN], np.float32)
     after = np.array([(3, 0, 0), NAN, (0, 3, 0), NAN], np.float32)
     expected = [(4, 0, 0), (2, 0, -4), (0, 6, 0), (0, 0, 0)]
-    np.testing.assert_allclose(velocities_between(now, before, after, 0.5), expected)
+    np.testing.assert_allclose(velocities_between(now, before, after, (0.5, 0.5)), expected)
+
+
+def test_times_before_and_after_may_differ():
+    """And now need not lie between them; at the same time as the only other one nothing is known."""
+    now, before, after = (np.array([(x, 0, 0)] * 2, np.float32) for x in (1, 0, 4))
+    before[1] = NAN
+    np.testing.assert_allclose(velocities_between(now, before, after, (0.5, 1.5))[:, 0], [2, 2])
+    np.testing.assert_allclose(velocities_between(now, before, after, (3.0, -1.0))[:, 0], [2, -3])
+    np.testing.assert_allclose(velocities_between(now, before, after, (2.0, 0.0))[:, 0], [2, 0])
