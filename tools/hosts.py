@@ -2,6 +2,7 @@
 
     python3 tools/hosts.py --list                                name the hosts and the windows
     python3 tools/hosts.py HOST | WINDOW [PYTEST_ARGUMENT ...]   set one up if need be, and test in it
+    python3 tools/hosts.py --report FILE HOST [PYTEST_ARGUMENT ...]  without a window, and write pytest's XML report
 
 All run tests/blender without a window; the real programs also run tests/gui, in their windows under Xvfb, and in them the built
 zip is installed and enabled first and tested at the next start. The machine's own Blender is the host `blender-own`;
@@ -260,6 +261,9 @@ def main(arguments: list[str]) -> int:
     if arguments == ["--list"]:
         print("\n".join([*names(), *windows()]))
         return 0
+    report = None
+    if arguments[:1] == ["--report"]:
+        _, report, *arguments = arguments
     if not arguments:
         raise ToolError(f"say which host: {', '.join([*names(), *windows()])}")
     name, *pytest_arguments = arguments
@@ -267,6 +271,8 @@ def main(arguments: list[str]) -> int:
         prepare(windows()[name].host)
         return run_window_suite(name, pytest_arguments)
     prepare(name)
+    if report is not None:
+        return run_suite(name, pytest_arguments, Path(report))
     statuses = [run_suite(name, pytest_arguments)]
     statuses += [run_window_suite(key, pytest_arguments) for key, window in windows().items() if window.host == name]
     return next(filter(None, statuses), 0)

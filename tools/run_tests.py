@@ -13,7 +13,7 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +28,8 @@ from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
+HOSTS_AT_ONCE = 2
+"""Hosts without a window that are tested beside one another; each takes little more than one processor."""
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Result:
 
 def run_all() -> list[Result]:
     ensure_test_programs()
-    with ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as downloading:
+    with ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as downloading, ThreadPoolExecutor(HOSTS_AT_ONCE) as beside:
         compiling.submit(native_tests.compile_tests)
         nightly = compiling.submit(rust.nightly)
         wheels = compiling.submit(extension_wheels.collect)
@@ -53,9 +55,9 @@ def run_all() -> list[Result]:
         results += [native_suite(name) for name in native_tests.stable_suites()]
         results += [native_suite(name, nightly) for name in native_tests.NIGHTLY_SUITES]
         results.append(check("extension", lambda: build_after(wheels)))
-        results += [host_suite(name, setup, hosts.run_suite) for name, setup in ready.items()]
+        results += beside.map(host_suite, ready.keys(), ready.values())
         windows = {name: ready[window.host] for name, window in hosts.windows().items()}
-        results += [host_suite(name, setup, hosts.run_window_suite) for name, setup in windows.items()]
+        results += [window_suite(name, setup) for name, setup in windows.items()]
     return results
 
 
@@ -91,15 +93,36 @@ def pytest_suite(name: str, *options: str) -> Result:
     return result_of(name, status)
 
 
-def host_suite(name: str, setup: Future[None], run_suite: Callable[[str, Sequence[str], Path], int]) -> Result:
-    """Run the suite of a host or of a window, once that is set up."""
+def host_suite(name: str, setup: Future[None]) -> Result:
+    """Run the suite of a host, once that is set up; what it says is shown in one piece, because another may run beside it."""
+    try:
+        setup.result()
+    except ToolError as error:
+        return missing_suite(name, error)
+    command = [sys.executable, str(ROOT / "tools" / "hosts.py"), "--report", str(report_of(name)), name, "-q"]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    announce(f"Blender tests: {name}", done.stdout)
+    return result_of(name, done.returncode)
+
+
+def window_suite(name: str, setup: Future[None]) -> Result:
+    """Run the suite of a window, once its host is set up; alone, for it watches how what is drawn follows in time."""
     announce(f"Blender tests: {name}")
     try:
         setup.result()
     except ToolError as error:
         return missing_suite(name, error)
     try:
-        status = run_suite(name, ["-q"], report_of(name))
+        status = hosts.run_window_suite(name, ["-q"], report_of(name))
     except ToolError as error:
         print(error, flush=True)
         return Result(name, failed=1, problem=str(error).splitlines()[0])
@@ -156,8 +179,8 @@ def judged(result: Result, status: int) -> Result:
     return result
 
 
-def announce(title: str) -> None:
-    print(f"\n=== {title} ===", flush=True)
+def announce(title: str, text: str = "") -> None:
+    print(f"\n=== {title} ===\n{text}", end="", flush=True)
 
 
 def summarise(results: list[Result]) -> int:
