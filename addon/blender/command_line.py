@@ -92,6 +92,13 @@ def _job(options: argparse.Namespace) -> RenderJob:
         backend=options.backend,
         camera=_camera(scene, options.camera),
         resolution=options.resolution,
+        tracing={
+            "use_tracing": options.ray_tracing,
+            "reflections": options.reflections,
+            "refractions": options.refractions,
+            "occlusion_rays": options.occlusion_rays,
+            "samples": options.light_samples,
+        },
     )
     return RenderJob(
         scene_uid=scene.session_uid,

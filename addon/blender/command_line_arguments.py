@@ -16,6 +16,13 @@ example:
 """
 
 
+_TRACED = {
+    "reflections": "how many mirrors light may meet",
+    "refractions": "how many surfaces light may pass",
+    "occlusion-rays": "how many rays ask how much of the world a point sees, 0 for none",
+    "light-samples": "how often light is traced for each sample",
+}
+
 _LAST_FRAME = 1048574
 """Blender's own limit."""
 
@@ -83,6 +90,15 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
     render.add_argument(
         "--samples", type=sample_count, metavar="N", help="of Combined and Alpha, for antialiasing; the scene's if left out"
     )
+    render.add_argument(
+        "--ray-tracing",
+        action=argparse.BooleanOptionalAction,
+        help="follow light beyond the first surface in Combined; the scene's choice if left out",
+    )
+    for name, what in _TRACED.items():
+        render.add_argument(
+            f"--{name}", type=whole_number, metavar="N", help=f"{what}, with ray tracing; the scene's number if left out"
+        )
     render.add_argument("--method", metavar="NAME", help="how the surface is found; the scene's choice if left out")
     render.add_argument("--backend", metavar="NAME", help="auto, gpu or cpu; the scene's choice if left out")
     render.add_argument("--compression", choices=COMPRESSIONS, default="ZIP", help="all lossless; ZIP if left out")
@@ -143,6 +159,13 @@ def sample_count(text: str) -> int:
     """A number of samples, 1 or more."""
     if not re.fullmatch(r"\d+", text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is no number of samples; write 1 or more")
+    return int(text)
+
+
+def whole_number(text: str) -> int:
+    """A number, 0 or more."""
+    if not re.fullmatch(r"\d+", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number; write 0 or more")
     return int(text)
 
 

@@ -13,7 +13,7 @@ from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
 from .engine_name import ENGINE
-from .read_materials import read_lighting
+from .read_lighting import read_lighting
 from .read_meshes import read_meshes
 from .render_scene import Control, RenderSettings, read_view_layer
 from .rendered_view import RenderedMeshes, view_matrices
@@ -101,8 +101,8 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         self._show_progress(0.0, "Reading the scene")
         read = read_view_layer(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
         image = read.image(Control(self.test_break, self._show_progress))
-        if image.info.dropped_text:
-            self.report({"WARNING"}, image.info.dropped_text)
+        for sentence in filter(None, (image.info.dropped_text, *image.info.notes)):
+            self.report({"WARNING"}, sentence)
         self._give(view_layer, image)
 
     def _show_progress(self, share: float, text: str) -> None:

@@ -27,6 +27,7 @@ _CLOSED: ClassVar = {"DEFAULT_CLOSED"}
 _LOOK_SETTINGS: dict[str, tuple[str, ...]] = {
     "studio": ("color", "ambient", "roughness", "metallic", "light", "light_strength"),
     "water": ("color", "absorption", "ior", "roughness", "light", "light_strength"),
+    "material": ("color", "metallic", "roughness", "transmission", "absorption", "ior"),
     "headlight": ("color", "ambient"),
     "flat": ("color",),
     "normal": (),
@@ -98,6 +99,8 @@ class MENISCUS_OT_add_preset(AddPresetBase, bpy.types.Operator):
         for name in (
             *("kernel", "isovalue", "style", "color", "ambient", "roughness", "metallic", "light", "light_strength"),
             *("absorption", "ior", "use_speed_range", "speed_min", "speed_max", "depth_contrast", "depth_contrast_radius"),
+            *("render_style", "transmission", "use_tracing", "tracing_reflections", "tracing_refractions", "tracing_samples"),
+            *("use_tracing_shadows", "use_tracing_occlusion", "tracing_occlusion_rays", "tracing_occlusion_distance"),
         )
     ]
 
@@ -165,6 +168,30 @@ class MENISCUS_PT_sidebar_look(_SidebarPanel, bpy.types.Panel):
         _draw_look(self.layout, context.scene.meniscus)
 
 
+class _TracingPanel:
+    """How far light is followed."""
+
+    bl_label = "Ray Tracing"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.meniscus, "use_tracing", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.active = context.scene.meniscus.use_tracing
+        _draw_tracing(_split(self.layout), context.scene.meniscus)
+
+
+class MENISCUS_PT_sidebar_tracing(_SidebarPanel, _TracingPanel, bpy.types.Panel):
+    """The same for viewports that show materials."""
+
+    bl_parent_id = "MENISCUS_PT_sidebar"
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return LOOK_STYLES[context.scene.meniscus.style].uses_scene
+
+
 class MENISCUS_PT_sidebar_surface(_SidebarPanel, bpy.types.Panel):
     """What the surface is, and how it is found."""
 
@@ -187,6 +214,7 @@ class MENISCUS_PT_sidebar_quality(_SidebarPanel, bpy.types.Panel):
         layout = _split(self.layout)
         layout.prop(context.scene.meniscus, "preview_samples")
         layout.prop(context.scene.meniscus, "preview_frame_rate")
+        layout.prop(context.scene.meniscus, "use_preview_tracing")
 
 
 class MENISCUS_PT_sidebar_statistics(_SidebarPanel, bpy.types.Panel):
@@ -315,8 +343,23 @@ class MENISCUS_PT_render_look(_EnginePanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = _split(self.layout)
-        layout.prop(context.scene.meniscus, "render_style", text="Look")
-        layout.prop(context.scene.meniscus, "render_meshes")
+        settings = context.scene.meniscus
+        layout.prop(settings, "render_style", text="Look")
+        layout.prop(settings, "render_meshes")
+        if LOOK_STYLES[settings.render_style].uses_scene:
+            layout.label(text="Sources without a material:")
+            for name in _LOOK_SETTINGS["material"]:
+                layout.prop(settings, name)
+
+
+class MENISCUS_PT_tracing(_EnginePanel, _TracingPanel, bpy.types.Panel):
+    """Traced light of the render engine."""
+
+    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return super().poll(context) and LOOK_STYLES[context.scene.meniscus.render_style].uses_scene
 
 
 class _PassesPanel(_PropertiesPanel):
@@ -411,6 +454,16 @@ def _draw_look(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
         radius.prop(settings, "depth_contrast_radius")
 
 
+def _draw_tracing(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    for name in ("tracing_samples", "tracing_reflections", "tracing_refractions", "use_tracing_shadows"):
+        layout.prop(settings, name)
+    layout.prop(settings, "use_tracing_occlusion")
+    occlusion = layout.column(align=True)
+    occlusion.active = settings.use_tracing_occlusion
+    occlusion.prop(settings, "tracing_occlusion_rays")
+    occlusion.prop(settings, "tracing_occlusion_distance")
+
+
 def _draw_problem(layout: bpy.types.UILayout) -> None:
     if STATUS.problem:
         box = layout.box()
@@ -463,6 +516,7 @@ _CLASSES = (
     MENISCUS_PT_sidebar,
     MENISCUS_PT_sidebar_source,
     MENISCUS_PT_sidebar_look,
+    MENISCUS_PT_sidebar_tracing,
     MENISCUS_PT_sidebar_surface,
     MENISCUS_PT_sidebar_quality,
     MENISCUS_PT_sidebar_statistics,
@@ -473,6 +527,7 @@ _CLASSES = (
     MENISCUS_PT_compositing,
     MENISCUS_PT_sampling,
     MENISCUS_PT_render_look,
+    MENISCUS_PT_tracing,
     MENISCUS_PT_passes,
     MENISCUS_PT_fluid_passes,
 )

@@ -20,6 +20,7 @@ from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES
+from ..fluid.tracing import Tracing
 from ..render.registry import method_infos
 from .changes import note_display, note_source
 
@@ -237,7 +238,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         name="Meshes",
         description="How renders show what is not fluid",
         items=(
-            ("SHADED", "Shaded", "Plainly shaded, without shadows; fluid hides them and is hidden by them", 0),
+            ("SHADED", "Shaded", "Shaded in the light of the scene; fluid hides them and is hidden by them", 0),
             (
                 "HOLDOUT",
                 "Holdout",
@@ -304,10 +305,88 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
     absorption: FloatProperty(
         name="Absorption",
-        description="How much light each Blender unit of fluid takes away, most of the colours that the surface colour lacks",
+        description="How much light each Blender unit of clear fluid takes away, most of the colours that the surface colour lacks",
         default=Look().absorption,
         min=0.0,
         soft_max=20.0,
+        update=note_display,
+    )
+    transmission: FloatProperty(
+        name="Transmission",
+        description="Share of the light that passes through the surface, where fluid without a material is shown by its material",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=note_display,
+    )
+    use_tracing: BoolProperty(
+        name="Ray Tracing",
+        description="Follow light beyond the first surface, where materials are shown: shadows, reflections, refraction",
+        default=False,
+        update=note_display,
+    )
+    use_preview_tracing: BoolProperty(
+        name="Ray Tracing",
+        description="Trace light in viewports too, where they show materials and ray tracing is on",
+        default=True,
+        update=note_display,
+    )
+    tracing_reflections: IntProperty(
+        name="Reflections",
+        description="How many mirrors light may meet; after the last one they mirror the world alone",
+        default=Tracing().reflections,
+        min=0,
+        max=64,
+        soft_max=16,
+        update=note_display,
+    )
+    tracing_refractions: IntProperty(
+        name="Refractions",
+        description="How many surfaces light may pass; a drop of water has two, after the last one the world is seen",
+        default=Tracing().refractions,
+        min=0,
+        max=64,
+        soft_max=32,
+        update=note_display,
+    )
+    use_tracing_shadows: BoolProperty(
+        name="Shadows",
+        description="Let what stands before a light take it away",
+        default=Tracing().shadows,
+        update=note_display,
+    )
+    use_tracing_occlusion: BoolProperty(
+        name="Ambient Occlusion",
+        description="Let what is near take the light of the world away",
+        default=False,
+        update=note_display,
+    )
+    tracing_occlusion_rays: IntProperty(
+        name="Rays",
+        description="How many rays of each sample ask how much of the world a point sees",
+        default=8,
+        min=1,
+        max=4096,
+        soft_max=64,
+        update=note_display,
+    )
+    tracing_occlusion_distance: FloatProperty(
+        name="Distance",
+        description="How far these rays look; what is farther takes no light away. 0 for no limit",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+        unit="LENGTH",
+        update=note_display,
+    )
+    tracing_samples: IntProperty(
+        name="Light Samples",
+        description="How often light is traced for each sample of a pixel: more lessen the noise of soft shadows and dull surfaces",
+        default=Tracing().samples,
+        min=1,
+        max=65536,
+        soft_max=64,
         update=note_display,
     )
     ior: FloatProperty(

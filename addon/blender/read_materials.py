@@ -1,62 +1,67 @@
-"""Materials, lights and the world of a Blender scene, as far as a look can show them."""
+"""Materials of a Blender scene, as far as a look can show them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import bpy
-import numpy as np
 
-from ..fluid.lighting import FluidSource, Light, Lighting, Material, Vector
+from ..fluid.lighting import FluidSource, Material, Vector
+from .nodes import NodeValues, output_source, scaled
+from .scene_notes import note
 
-
-def read_source(item: bpy.types.Object, view_layer: bpy.types.ViewLayer, settings: bpy.types.PropertyGroup) -> FluidSource:
-    """What a render knows of an evaluated object that supplies balls; `settings` are those of the scene.
-
-    Where it has no material it looks as the scene's settings say.
-    """
-    material = view_layer.material_override or _material_of(item)
-    plain = Material(tuple(settings.color), settings.metallic, settings.roughness, ior=settings.ior)
-    is_holdout = item.is_holdout or item.original.holdout_get(view_layer=view_layer)
-    return FluidSource(item.name, item.pass_index, plain if material is None else read_material(material), is_holdout)
+_BLACK, _WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
-def read_material(material: bpy.types.Material | None) -> Material:
-    """A material as its Principled BSDF has it.
-
-    Inputs that are linked to other nodes differ from place to place: for them the settings of the viewport display count, or
-    the defaults. So they do where there is no Principled BSDF.
-    """
-    if material is None:
-        return Material()
-    node = _principled(material)
-    plain = Material(tuple(material.diffuse_color[:3]), material.metallic, material.roughness)
-    if node is None:
-        return plain
-    emission = _color(node, "Emission Color", (0.0, 0.0, 0.0))
-    strength = _number(node, "Emission Strength", 0.0)
-    return Material(
-        color=_color(node, "Base Color", plain.color),
-        metallic=_number(node, "Metallic", plain.metallic),
-        roughness=_number(node, "Roughness", plain.roughness),
-        transmission=_number(node, "Transmission Weight", 0.0),
-        ior=_number(node, "IOR", 1.5),
-        emission=_scaled(emission, strength),
-    )
-
-
-def read_lighting(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None = None) -> Lighting:
-    """The lights that a render shows, or those of a viewport, and the world.
+def read_source(
+    item: bpy.types.Object, view_layer: bpy.types.ViewLayer, settings: bpy.types.PropertyGroup, uses_materials: bool
+) -> FluidSource:
+    """What a render knows of an evaluated object that supplies balls.
 
     Parameters
     ----------
-    depsgraph
-        Evaluated dependency graph.
-    space
-        The viewport whose lights count; None for those of a render.
+    settings
+        Those of the scene: it looks as they say where it has no material.
+    uses_materials
+        Whether its material is read at all.
     """
-    return Lighting(tuple(_lights(depsgraph, space)), _world(depsgraph.scene_eval.world))
+    is_holdout = item.is_holdout or item.original.holdout_get(view_layer=view_layer)
+    read = _material_of_source(item, view_layer, settings) if uses_materials else Material()
+    return FluidSource(item.name, item.pass_index, read, is_holdout)
+
+
+def _material_of_source(item: bpy.types.Object, view_layer: bpy.types.ViewLayer, settings: bpy.types.PropertyGroup) -> Material:
+    material = view_layer.material_override or _material_of(item)
+    return _plain_material(settings) if material is None else read_material(material)
+
+
+def read_material(material: bpy.types.Material | None) -> Material:
+    """A material as its Principled BSDF, or another simple shader, and its volume have it.
+
+    Inputs that are linked to other nodes differ from place to place: for them the settings of the viewport display count, or
+    the defaults. So they do where the surface is made of other nodes.
+    """
+    if material is None:
+        return Material()
+    plain = Material(tuple(material.diffuse_color[:3]), material.metallic, material.roughness)
+    surface, volume = output_source(material, "Surface"), output_source(material, "Volume")
+    absorption = _absorption(material, volume)
+    if surface is None:
+        # What has a volume alone bends no light.
+        return plain if volume is None else Material(_WHITE, roughness=0.0, transmission=1.0, ior=1.0, absorption=absorption)
+    read = _SHADERS.get(surface.type)
+    if read is None:
+        _note_unread(material, f"its surface is made by the node '{surface.name}'")
+        return Material(plain.color, plain.metallic, plain.roughness, absorption=absorption)
+    values = NodeValues(surface)
+    found = read(values, plain)
+    if values.unread:
+        _note_unread(material, f"nodes are linked to its {' and '.join(values.unread)}")
+    return Material(**{"absorption": absorption, **found})
+
+
+def _note_unread(material: bpy.types.Material, reason: str) -> None:
+    note(f"'{material.name}' is shown with the colours of its viewport display, because {reason}")
 
 
 def _material_of(item: bpy.types.Object) -> bpy.types.Material | None:
@@ -67,82 +72,115 @@ def _material_of(item: bpy.types.Object) -> bpy.types.Material | None:
     return slots[slot].material if len(slots) else None
 
 
-def _principled(material: bpy.types.Material) -> bpy.types.Node | None:
-    node = _surface_node(material)
-    return node if node is not None and node.type == "BSDF_PRINCIPLED" else None
-
-
-def _surface_node(owner: bpy.types.Material | bpy.types.World) -> bpy.types.Node | None:
-    """The node that makes the surface of a material or a world; None where it is made without nodes."""
-    # Since 5.0 there are nodes always, and to ask is deprecated.
-    if owner.node_tree is None or (bpy.app.version < (5, 0) and not owner.use_nodes):
-        return None
-    output = owner.node_tree.get_output_node("ALL")
-    links = output.inputs["Surface"].links if output is not None else ()
-    return links[0].from_node if links else None
-
-
-def _number(node: bpy.types.Node, name: str, default: float) -> float:
-    entry = node.inputs[name]
-    return default if entry.is_linked else float(entry.default_value)
-
-
-def _color(node: bpy.types.Node, name: str, default: Vector) -> Vector:
-    entry = node.inputs[name]
-    return default if entry.is_linked else tuple(entry.default_value[:3])
-
-
-def _lights(depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D | None) -> Iterator[Light]:
-    for item in depsgraph.objects:
-        if item.type == "LIGHT" and (space is None or item.original.visible_get(viewport=space)):
-            yield _light(item.data, np.array(item.matrix_world, np.float64))
-
-
-def _light(light: bpy.types.Light, world_from_light: np.ndarray) -> Light:
-    size, right, is_round = _area(light, world_from_light) if light.type == "AREA" else ((0.0, 0.0), (1.0, 0.0, 0.0), False)
-    return Light(
-        kind=light.type,
-        power=_power(light),
-        position=tuple(world_from_light[:3, 3].tolist()),
-        direction=_unit(-world_from_light[:3, 2], (0.0, 0.0, -1.0)),
-        cone=(math.cos(light.spot_size / 2), light.spot_blend) if light.type == "SPOT" else (0.0, 0.0),
-        size=size,
-        right=right,
-        is_round=is_round,
+def _plain_material(settings: bpy.types.PropertyGroup) -> Material:
+    """What the settings of a scene say of fluid without a material."""
+    clear, color = settings.transmission, tuple(settings.color)
+    return Material(
+        # Clear fluid has its colour from what it takes away, as in the look Water.
+        color=tuple(clear + (1.0 - clear) * channel for channel in color),
+        metallic=settings.metallic,
+        roughness=settings.roughness,
+        transmission=clear,
+        ior=settings.ior,
+        absorption=tuple(settings.absorption * max(1.0 - channel, 0.0) for channel in color) if clear > 0 else _BLACK,
     )
 
 
-def _power(light: bpy.types.Light) -> Vector:
-    strength = light.energy * 2.0 ** getattr(light, "exposure", 0.0)  # since 4.5
-    color = _scaled(tuple(light.color), strength)
-    if getattr(light, "use_temperature", False):
-        color = tuple(mine * theirs for mine, theirs in zip(color, light.temperature_color, strict=True))
-    return color
+def _principled(values: NodeValues, plain: Material) -> dict[str, object]:
+    return {
+        "color": values.color("Base Color", plain.color),
+        "metallic": values.number("Metallic", plain.metallic),
+        "roughness": values.number("Roughness", plain.roughness),
+        "transmission": values.number("Transmission Weight", 0.0),
+        "ior": values.number("IOR", 1.5),
+        "emission": scaled(values.color("Emission Color", _BLACK), values.number("Emission Strength", 0.0)),
+    }
 
 
-def _area(light: bpy.types.AreaLight, world_from_light: np.ndarray) -> tuple[tuple[float, float], Vector, bool]:
-    """Width and height of the lamp as it stands in the scene, the direction of its width, and whether it is round."""
-    width = light.size
-    height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-    across, along = (float(np.linalg.norm(world_from_light[:3, axis])) for axis in (0, 1))
-    right = _unit(world_from_light[:3, 0], (1.0, 0.0, 0.0))
-    return (width * across, height * along), right, light.shape in {"DISK", "ELLIPSE"}
+def _glass(values: NodeValues, plain: Material) -> dict[str, object]:
+    return {
+        "color": _squared(values.color("Color", plain.color)),
+        "roughness": values.number("Roughness", plain.roughness),
+        "transmission": 1.0,
+        "ior": values.number("IOR", 1.5),
+    }
 
 
-def _unit(vector: np.ndarray, default: Vector) -> Vector:
-    length = np.linalg.norm(vector)
-    return tuple((vector / length).tolist()) if length > 0 else default
+def _transparent(values: NodeValues, plain: Material) -> dict[str, object]:
+    return {"color": _squared(values.color("Color", plain.color)), "roughness": 0.0, "transmission": 1.0, "ior": 1.0}
 
 
-def _world(world: bpy.types.World | None) -> Vector:
-    """Radiance of the world's background where it is one colour, else of its viewport display."""
-    if world is None:
-        return 0.0, 0.0, 0.0
-    node = _surface_node(world)
-    if node is None or node.type != "BACKGROUND":
-        return tuple(world.color)
-    return _scaled(_color(node, "Color", tuple(world.color)), _number(node, "Strength", 1.0))
+def _glossy(values: NodeValues, plain: Material) -> dict[str, object]:
+    color = values.color("Base Color" if values.node.type == "BSDF_METALLIC" else "Color", plain.color)
+    return {"color": color, "metallic": 1.0, "roughness": values.number("Roughness", plain.roughness)}
 
 
-def _scaled(color: Vector, factor: float) -> Vector:
-    return color[0] * factor, color[1] * factor, color[2] * factor
+def _diffuse(values: NodeValues, plain: Material) -> dict[str, object]:
+    return {"color": values.color("Color", plain.color), "roughness": 1.0, "ior": 1.0}
+
+
+def _emission(values: NodeValues, plain: Material) -> dict[str, object]:
+    radiance = scaled(values.color("Color", plain.color), values.number("Strength", 1.0))
+    return {"color": _BLACK, "roughness": 1.0, "ior": 1.0, "emission": radiance}
+
+
+_SHADERS: dict[str, Callable[[NodeValues, Material], dict[str, object]]] = {
+    "BSDF_PRINCIPLED": _principled,
+    "BSDF_GLASS": _glass,
+    "BSDF_REFRACTION": _glass,
+    "BSDF_TRANSPARENT": _transparent,
+    "BSDF_GLOSSY": _glossy,
+    "BSDF_METALLIC": _glossy,
+    "BSDF_DIFFUSE": _diffuse,
+    "EMISSION": _emission,
+}
+"""What each shader node says of a material, by the node's type."""
+
+
+def _squared(color: Vector) -> Vector:
+    """The base colour of what has a colour at each surface: a Principled BSDF takes the root there."""
+    return color[0] ** 2, color[1] ** 2, color[2] ** 2
+
+
+def _absorption(material: bpy.types.Material, volume: bpy.types.Node | None) -> Vector:
+    """What the volume of a material takes away a Blender unit, as Cycles has it; light that it scatters is not followed."""
+    if volume is None:
+        return _BLACK
+    read = _VOLUMES.get(volume.type)
+    values = NodeValues(volume)
+    found = _BLACK if read is None else read(values)
+    if read is None or values.unread:
+        note(f"The volume of '{material.name}' is left out or simplified: only Volume Absorption, Principled Volume and Volume "
+             "Coefficients without textures are shown")  # fmt: skip
+    return found
+
+
+def _absorbed(values: NodeValues) -> Vector:
+    return _taken(values.color("Color", _WHITE), values.number("Density", 1.0))
+
+
+def _principled_volume(values: NodeValues) -> Vector:
+    density = values.number("Density", 1.0)
+    scattered = _taken(values.color("Color", _WHITE), 1.0)
+    kept = values.color("Absorption Color", _BLACK)
+    red, green, blue = (
+        density * part * max(1.0 - max(share, 0.0) ** 0.5, 0.0) for part, share in zip(scattered, kept, strict=True)
+    )
+    return red, green, blue
+
+
+def _coefficients(values: NodeValues) -> Vector:
+    return values.color("Absorption Coefficients", _BLACK)
+
+
+def _taken(color: Vector, density: float) -> Vector:
+    red, green, blue = (max(1.0 - channel, 0.0) * max(density, 0.0) for channel in color)
+    return red, green, blue
+
+
+_VOLUMES: dict[str, Callable[[NodeValues], Vector]] = {
+    "VOLUME_ABSORPTION": _absorbed,
+    "PRINCIPLED_VOLUME": _principled_volume,
+    "VOLUME_COEFFICIENTS": _coefficients,
+}
+"""What each volume node takes away, by the node's type."""

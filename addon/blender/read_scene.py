@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,8 @@ from ..fluid.balls import Balls
 from ..fluid.errors import InputError
 from ..fluid.field import Field
 from ..fluid.lighting import FluidSource
-from ..fluid.look import Look
+from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.tracing import Tracing
 from .ball_part import BallPart
 from .read_materials import read_source
 from .read_particles import has_particle_systems, read_particles
@@ -24,10 +26,11 @@ from .visible_sources import Source, settings_of, visible_sources
 
 @dataclass(frozen=True)
 class Fluid:
-    """All balls of a scene, and the objects that they come from by their index in :attr:`Balls.sources`."""
+    """All balls of a scene, the objects that they come from by :attr:`Balls.sources`, and what the reader has noted."""
 
     balls: Balls
     sources: tuple[FluidSource, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def read_fluid(
     space
         The viewport whose local view counts; None for none.
     uses_materials
-        Whether balls without colours of their own get that of their material, not that of the scene.
+        Whether materials are read, and balls without colours of their own get that of their material, not that of the scene.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def read_parts(
     for source in visible_sources(depsgraph, viewport, space):
         index = indices.setdefault(source.object.name_full, len(objects))
         if index == len(objects):
-            objects.append(read_source(source.object, depsgraph.view_layer, settings))
+            objects.append(read_source(source.object, depsgraph.view_layer, settings, uses_materials))
         own_color = objects[index].material.color if uses_materials else None
         parts += [
             replace(part, source=index, colors=own_color if part.colors is None else part.colors)
@@ -108,8 +111,11 @@ def read_field(scene: bpy.types.Scene) -> Field:
     return Field(kernel=scene.meniscus.kernel, isovalue=scene.meniscus.isovalue)
 
 
-def read_look(scene: bpy.types.Scene, style: str) -> Look:
-    """The colour and light that the scene's settings describe, in one of the :data:`look.LOOK_STYLES`."""
+def read_look(scene: bpy.types.Scene, style: str, choices: Mapping[str, Any] | None = None) -> Look:
+    """The colour and light that the scene's settings describe, in one of the :data:`look.LOOK_STYLES`.
+
+    `choices` are for :func:`read_tracing`.
+    """
     settings = scene.meniscus
     return Look(
         style=style,
@@ -124,7 +130,37 @@ def read_look(scene: bpy.types.Scene, style: str) -> Look:
         speed_range=(settings.speed_min, settings.speed_max) if settings.use_speed_range else None,
         depth_contrast=settings.depth_contrast,
         depth_contrast_radius=settings.depth_contrast_radius,
+        tracing=read_tracing(scene, choices or {}) if LOOK_STYLES[style].uses_scene else None,
     )
+
+
+def read_tracing(scene: bpy.types.Scene, choices: Mapping[str, Any]) -> Tracing | None:
+    """How far the scene's settings have light followed; None where they do not.
+
+    Parameters
+    ----------
+    choices
+        What counts in place of the settings: attributes of :class:`tracing.Tracing`, and ``use_tracing``. None counts for
+        nothing.
+
+    Raises
+    ------
+    InputError
+        A number is out of range.
+    """
+    settings = scene.meniscus
+    given = {name: choice for name, choice in choices.items() if choice is not None}
+    if not given.pop("use_tracing", settings.use_tracing):
+        return None
+    own = {
+        "reflections": settings.tracing_reflections,
+        "refractions": settings.tracing_refractions,
+        "shadows": settings.use_tracing_shadows,
+        "occlusion_rays": settings.tracing_occlusion_rays if settings.use_tracing_occlusion else 0,
+        "occlusion_distance": settings.tracing_occlusion_distance or math.inf,
+        "samples": settings.tracing_samples,
+    }
+    return Tracing(**{**own, **given})
 
 
 def _parts_of(source: Source, depsgraph: bpy.types.Depsgraph, viewport: bool) -> list[BallPart]:

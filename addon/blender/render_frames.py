@@ -113,7 +113,7 @@ class FrameReport:
     info
         How the image came about; its milliseconds start with the scene's evaluation and end with the writing.
     note
-        One sentence about unusable balls or missing fluid, empty where there is nothing to say.
+        Sentences about unusable balls, missing fluid or what could not be read, empty where there is nothing to say.
     error
         One sentence, empty where the files were written.
     written
@@ -357,9 +357,10 @@ def frame_steps(job: RenderJob, is_cancelled: Callable[[], bool]) -> Generator[F
 
 
 def _note(image: ImageBuffers) -> str:
+    about_balls = image.info.dropped_text
     if image.info.counts.get("balls", 0) == 0:
-        return "There is no fluid in this frame: if there should be, check the simulation's cache"
-    return image.info.dropped_text
+        about_balls = "There is no fluid in this frame: if there should be, check the simulation's cache"
+    return ". ".join(filter(None, (about_balls, *image.info.notes)))
 
 
 def _deep_compression(compression: str) -> str:

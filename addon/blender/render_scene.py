@@ -6,7 +6,7 @@ First everything is read, on Blender's own thread, which alone may touch the sce
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -37,9 +37,10 @@ from .fluid_motion import needs_neighbors, with_motion
 from .moving import may_move
 from .preferences import backend_of, threads_of
 from .read_camera import read_camera
-from .read_materials import read_lighting
+from .read_lighting import read_lighting
 from .read_meshes import read_meshes, read_moved_vertices
 from .read_scene import Fluid, FluidParts, read_field, read_look, read_parts
+from .scene_notes import collected_notes
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 
 MOST_STEPS = 8
@@ -67,6 +68,8 @@ class RenderSettings:
         None for the scene's.
     resolution
         Width and height in pixels; None for the scene's.
+    tracing
+        What counts in place of the scene's settings of ray tracing, see :func:`read_scene.read_tracing`.
     """
 
     passes: tuple[str, ...]
@@ -77,6 +80,7 @@ class RenderSettings:
     threads: int = 0
     camera: bpy.types.Object | None = None
     resolution: tuple[int, int] | None = None
+    tracing: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, **choices: Any) -> RenderSettings:
@@ -182,6 +186,8 @@ class SceneRender:
         How it is rendered.
     milliseconds
         The time that reading took.
+    notes
+        Sentences on what could not be read as it is.
     """
 
     settings: RenderSettings
@@ -189,6 +195,7 @@ class SceneRender:
     motion: Motion | None
     shutter: tuple[_Moment, ...]
     milliseconds: dict[str, float]
+    notes: tuple[str, ...] = ()
 
     def image(self, control: Control) -> ImageBuffers:
         """The passes; the report begins with the stage "read".
@@ -201,6 +208,7 @@ class SceneRender:
         image = self._shot(self.moment, self.moment.camera, self.settings.first_passes, control, self.motion)
         self._antialias(image, control)
         image.info.milliseconds = {**self.milliseconds, **image.info.milliseconds}
+        image.info.notes = self.notes
         return image
 
     def deep_image(self, control: Control) -> DeepImage:
@@ -280,8 +288,9 @@ def read_view_layer(depsgraph: bpy.types.Depsgraph, settings: RenderSettings, se
         One sentence for the user.
     """
     milliseconds: dict[str, float] = {}
-    with timed(milliseconds, "read"):
-        return SceneRender(settings, *_Reader(depsgraph, settings, set_frame).read(), milliseconds)
+    with timed(milliseconds, "read"), collected_notes() as notes:
+        read = _Reader(depsgraph, settings, set_frame).read()
+    return SceneRender(settings, *read, milliseconds, tuple(notes))
 
 
 @dataclass(frozen=True)
@@ -336,7 +345,7 @@ class _Reader:
         )
 
     def _look(self) -> Look:
-        return read_look(self._scene, self._scene.meniscus.render_style)
+        return read_look(self._scene, self._scene.meniscus.render_style, self.settings.tracing)
 
     def _fluid(self) -> FluidParts:
         return read_parts(self.depsgraph, uses_materials=LOOK_STYLES[self._look().style].uses_scene)

@@ -10,6 +10,7 @@ import numpy as np
 from ..fluid.balls import Balls
 from .changes import Changes
 from .read_scene import Fluid, read_fluid
+from .scene_notes import collected_notes
 from .visible_sources import NoSourceError
 
 _ARRAYS = ("positions", "radii", "weights", "colors", "velocities", "ids", "sources")
@@ -68,7 +69,9 @@ class SceneBalls:
     def _read(self, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D, uses_materials: bool) -> Fluid | None:
         self.reads += 1
         try:
-            return read_fluid(depsgraph, viewport=True, space=space, uses_materials=uses_materials)
+            with collected_notes() as notes:
+                fluid = read_fluid(depsgraph, viewport=True, space=space, uses_materials=uses_materials)
+            return replace(fluid, notes=tuple(notes))
         except NoSourceError:
             self._changes.may_have_sources = _any_source()
             return None

@@ -27,7 +27,7 @@ from .engine_name import is_engine_view
 from .legend import draw_legend
 from .preferences import backend_of, preferences
 from .presenter import UNCHANGED, Place, Presenter
-from .read_materials import read_lighting
+from .read_lighting import read_lighting
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
 from .texture_sharing import SHARING

@@ -30,6 +30,8 @@ class RenderInfo:
         Numbers worth knowing: ``balls``, ``balls_drawn``, ``peels``, ``overflows`` ... as the method reports them.
     dropped
         Unusable balls by reason, see :class:`Balls`.
+    notes
+        Sentences on what is shown otherwise than the scene says.
     """
 
     method: str = ""
@@ -39,6 +41,7 @@ class RenderInfo:
     milliseconds: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def dropped_text(self) -> str:
