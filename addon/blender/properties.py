@@ -305,7 +305,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
     absorption: FloatProperty(
         name="Absorption",
-        description="How much light each Blender unit of clear fluid takes away, most of the colours that the surface colour lacks",
+        description="How much light each Blender unit of clear fluid takes away, most of the colours that its colour lacks",
         default=Look().absorption,
         min=0.0,
         soft_max=20.0,
@@ -313,7 +313,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
     transmission: FloatProperty(
         name="Transmission",
-        description="Share of the light that passes through the surface, where fluid without a material is shown by its material",
+        description="Share of the light that passes through the surface of fluid without a material, where materials are shown",
         default=0.0,
         min=0.0,
         max=1.0,
@@ -382,7 +382,7 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
     )
     tracing_samples: IntProperty(
         name="Light Samples",
-        description="How often light is traced for each sample of a pixel: more lessen the noise of soft shadows and dull surfaces",
+        description="How often light is traced for each sample of a pixel: more lessens the noise of soft shadows and gloss",
         default=Tracing().samples,
         min=1,
         max=65536,

@@ -25,7 +25,9 @@ _WITH_SURFACE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have a surface, or can have a mesh made of it."""
 
 
-def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None = None) -> Meshes:
+def read_meshes(
+    depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None = None, is_traced: bool = False
+) -> Meshes:
     """All surfaces of a view layer that are not fluid, at its current frame, instances too.
 
     Parameters
@@ -34,6 +36,8 @@ def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D 
         Evaluated dependency graph. One that was made for the viewport holds only what the viewport evaluates.
     viewport
         The viewport whose visibility counts; None for that of renders.
+    is_traced
+        Whether light is traced, so that what no camera sees may be seen in mirrors and through what is clear.
 
     Raises
     ------
@@ -42,7 +46,7 @@ def read_meshes(depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D 
     """
     collected = _Collected(depsgraph.view_layer)
     if depsgraph.view_layer.use_solid:
-        for instance in _shown_instances(depsgraph, viewport):
+        for instance in _shown_instances(depsgraph, viewport, is_traced):
             collected.add(instance)
     return collected.meshes()
 
@@ -69,7 +73,7 @@ def read_moved_vertices(depsgraph: bpy.types.Depsgraph, meshes: Meshes) -> Float
     parts = {part.key: part for part in meshes.parts}
     positions = _EachOnce(_read_positions)
     vertices = meshes.vertices.copy()
-    for instance in _shown_instances(depsgraph, None):
+    for instance in _shown_instances(depsgraph, None):  # what no camera sees has no motion
         part = parts.get(_key_of(instance))
         if part is None or not _may_have_moved(instance, part, depsgraph.scene):
             continue
@@ -92,7 +96,7 @@ def _key_of(instance: bpy.types.DepsgraphObjectInstance) -> Hashable:
 
 
 def _shown_instances(
-    depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None
+    depsgraph: bpy.types.Depsgraph, viewport: bpy.types.SpaceView3D | None, is_traced: bool = False
 ) -> Iterator[bpy.types.DepsgraphObjectInstance]:
     """What there is to be seen; each is valid only until the next one is taken."""
     is_shown = _shown_in_render(depsgraph) if viewport is None else _shown_solid(depsgraph, viewport)
@@ -100,7 +104,7 @@ def _shown_instances(
         item = instance.instance_object if instance.is_instance else instance.object
         owner = instance.parent if instance.is_instance else item
         is_there = instance.show_self and is_shown(item, owner) and not _is_fluid(instance, item, depsgraph)
-        if is_there and _is_for_cameras(item, owner.original, depsgraph.view_layer):
+        if is_there and (_is_for_cameras(item, owner.original, depsgraph.view_layer) or (is_traced and _is_for_rays(item))):
             yield instance
 
 
@@ -114,6 +118,11 @@ def _shown_in_render(depsgraph: bpy.types.Depsgraph) -> ShownTest:
 def _is_for_cameras(item: bpy.types.Object, owner: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
     """Whether rays from the camera see an object that `owner`, an original one, puts where it is."""
     return bool(item.visible_camera) and not owner.indirect_only_get(view_layer=view_layer)
+
+
+def _is_for_rays(item: bpy.types.Object) -> bool:
+    """Whether mirrored or refracted rays see an object."""
+    return bool(item.visible_glossy or item.visible_transmission)
 
 
 def _is_missed(item: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> bool:
@@ -214,7 +223,13 @@ class _Collected:
         if arrays is None or not len(arrays.triangles):
             return
         owner = (instance.parent if instance.is_instance else item).original
-        known = MeshObject(item.name, item.pass_index, item.is_holdout or owner.holdout_get(view_layer=self.view_layer))
+        known = MeshObject(
+            item.name,
+            item.pass_index,
+            item.is_holdout or owner.holdout_get(view_layer=self.view_layer),
+            is_seen=_is_for_cameras(item, owner, self.view_layer),
+            is_traced=_is_for_rays(item),
+        )
         index = self.objects.setdefault(known, len(self.objects))
         slots = np.array([self._material(material) for material in self._materials_of(item)], np.int32)
         place = np.array(instance.matrix_world, np.float64)

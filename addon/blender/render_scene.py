@@ -31,7 +31,8 @@ from ..render.pass_images import needed_attributes
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
 from ..render.samples import sample_offset
-from ..render.surroundings import Backdrop, Motion
+from ..render.surroundings import Backdrop, Color, Motion
+from ..render.tracing import world_seen
 from .ball_part import FloatArray
 from .fluid_motion import needs_neighbors, with_motion
 from .moving import may_move
@@ -139,7 +140,7 @@ class _Moment:
     fluid: Fluid
     field: Field
     look: Look
-    background: tuple[float, float, float, float]
+    background: Color
     meshes: Meshes | None
     are_holdouts: bool
 
@@ -150,13 +151,17 @@ class _Moment:
 
     def backdrop(self, camera: Camera, threads: int, control: Control, motion: Motion | None = None) -> Backdrop | None:
         """What else than fluid is seen, with its motion where that is given; None where that is nothing."""
+        camera, lighting, background = camera.cropped(), self.look.lighting, self.background
+        is_opaque = background[3] > 0
+        if is_opaque and lighting.image is not None:
+            background = world_seen(camera, lighting, threads, control.watch)
         if self.meshes is None or not len(self.meshes):
-            return Backdrop.empty(camera.cropped(), self.background) if self.background[3] > 0 else None
+            return Backdrop.empty(camera, background) if is_opaque else None
         return backdrop(
             self.meshes,
-            camera.cropped(),
-            self.look.lighting,
-            self.background,
+            camera,
+            lighting,
+            background,
             self.are_holdouts,
             threads=threads,
             watch=control.watch,
@@ -351,7 +356,9 @@ class _Reader:
         return read_parts(self.depsgraph, uses_materials=LOOK_STYLES[self._look().style].uses_scene)
 
     def _meshes(self) -> Meshes | None:
-        return read_meshes(self.depsgraph) if self._scene.meniscus.render_meshes != "NONE" else None
+        if self._scene.meniscus.render_meshes == "NONE":
+            return None
+        return read_meshes(self.depsgraph, is_traced=self._look().tracing is not None)
 
     def _neighbors(self, fluid: FluidParts, meshes: Meshes | None, set_time: Callable[[float], None]) -> _Neighbors:
         """What may move, one frame before and one frame after."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -24,11 +25,17 @@ class MeshObject:
         The number that it has in the Object Index pass.
     is_holdout
         Whether it leaves a hole in the image.
+    is_seen
+        Whether cameras see it.
+    is_traced
+        Whether traced light meets it.
     """
 
     name: str
     pass_index: int = 0
     is_holdout: bool = False
+    is_seen: bool = True
+    is_traced: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,3 +121,25 @@ class Meshes:
 
     def __len__(self) -> int:
         return len(self.triangles)
+
+    @cached_property
+    def seen(self) -> Meshes:
+        """Those of the triangles that cameras see; vertices, objects and materials stay what they are."""
+        return self._those([item.is_seen for item in self.objects])
+
+    @cached_property
+    def traced(self) -> Meshes:
+        """Those of the triangles that traced light meets; vertices, objects and materials stay what they are."""
+        return self._those([item.is_traced for item in self.objects])
+
+    def _those(self, are_wanted: list[bool]) -> Meshes:
+        if all(are_wanted):
+            return self
+        wanted = np.array(are_wanted)[self.object]
+        return replace(
+            self,
+            triangles=self.triangles[wanted],
+            normals=self.normals[wanted],
+            object=self.object[wanted],
+            material=self.material[wanted],
+        )

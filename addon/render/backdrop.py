@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from ..fluid.meshes import Meshes
 from ..fluid.passes import DEPTH_BACKGROUND
 from . import native
 from .material_shading import shade_image
-from .surroundings import Backdrop, Motion
+from .surroundings import Backdrop, Color, Motion
 from .vector_math import FloatArray
 
 _HOLE = (0.0, 0.0, 0.0, 0.0)
@@ -23,7 +24,7 @@ def backdrop(
     meshes: Meshes,
     camera: Camera,
     lighting: Lighting,
-    background: tuple[float, float, float, float],
+    background: Color | FloatArray,
     are_holdouts: bool = False,
     threads: int = 0,
     watch: Callable[[float], None] = native.let_interrupt,
@@ -38,7 +39,7 @@ def backdrop(
     camera
         What the image shows; it has no region.
     background
-        What is seen where there is nothing: linear Rec.709, premultiplied alpha.
+        What is seen where there is nothing: linear Rec.709, premultiplied alpha; one colour, or (height, width, 4).
     are_holdouts
         Whether all meshes leave holes; else those do that say so.
     threads, watch
@@ -51,8 +52,9 @@ def backdrop(
     DeviceError
         The native core is missing, or there is too little memory.
     """
+    traced, meshes = meshes.traced, meshes.seen
     if not len(meshes):
-        return Backdrop.empty(camera, background)
+        return replace(Backdrop.empty(camera, background), meshes=traced)
     depth, triangle, normal = _rasterized(meshes, camera, threads, watch)
     hit = triangle >= 0
     found = triangle[hit]
@@ -81,8 +83,8 @@ def backdrop(
         is_holdout=is_holdout,
         names=tuple(item.name for item in meshes.objects),
         pass_indices=tuple(item.pass_index for item in meshes.objects),
-        is_film_clear=background[3] == 0,
-        meshes=meshes,
+        is_film_clear=not np.any(np.asarray(background)[..., 3]),
+        meshes=traced,
         material=material,
         to_previous=to_previous,
         to_following=to_following,

@@ -323,7 +323,11 @@ class PassImages:
             SeenSurface(self._depth, self._normal, color, material, ball),
             request.camera,
             TracedScene(
-                request.balls, request.field, materials, self._look.lighting, None if backdrop is None else backdrop.meshes
+                request.balls,
+                request.field,
+                materials,
+                self._look.lighting,
+                None if self._behind is None else self._behind.meshes,
             ),
             tracing,
             self._contrast,

@@ -39,9 +39,10 @@ class Backdrop:
         The one colour of `rgba`; None where that differs.
     is_film_clear
         Whether there is nothing behind everything, so that the image is transparent there.
-    meshes, material
-        What traced light meets beside the fluid, and (height, width) int32: the materials that are seen of it, -1 where there
-        is nothing; None where there are no meshes.
+    meshes
+        What traced light meets beside the fluid; None where there is nothing.
+    material
+        (height, width) int32: the materials of these meshes that are seen, -1 where there is nothing; None where no mesh is.
     to_previous, to_following
         (height, width, 3): the ways to the places one frame before and one frame after, world space, 0 where there is nothing;
         None where all stands still or motion was not asked for.
@@ -63,8 +64,8 @@ class Backdrop:
     to_following: FloatArray | None = None
 
     @classmethod
-    def empty(cls, camera: Camera, rgba: Color = (0.0, 0.0, 0.0, 0.0)) -> Backdrop:
-        """Nothing but one colour, for a camera without region."""
+    def empty(cls, camera: Camera, rgba: Color | FloatArray = (0.0, 0.0, 0.0, 0.0)) -> Backdrop:
+        """Nothing but one colour, or (height, width, 4), for a camera without region."""
         shape = camera.height, camera.width
         nothing = np.broadcast_to(np.float32(0), (*shape, 3))
         return cls(
@@ -74,8 +75,8 @@ class Backdrop:
             color=nothing,
             object=np.broadcast_to(np.int32(-1), shape),
             is_holdout=np.broadcast_to(np.False_, shape),
-            color_behind=rgba,
-            is_film_clear=rgba[3] == 0,
+            color_behind=rgba if isinstance(rgba, tuple) else None,
+            is_film_clear=not np.any(np.asarray(rgba)[..., 3]),
         )
 
     @property

@@ -137,6 +137,19 @@ def trace_image(
         )
 
 
+def world_seen(camera: Camera, lighting: Lighting, threads: int = 0, watch: Watch = native.let_interrupt) -> FloatArray:
+    """What a camera, which has no region, sees of the world: (height, width, 4), linear Rec.709, opaque.
+
+    `threads` and `watch` are as for :class:`method.Request`.
+    """
+    core = native.load()
+    rgba = np.empty((camera.height, camera.width, 4), np.float32)
+    distant = lighting.world, *_world_arguments(core, lighting.image)
+    with native.translated_errors():
+        core.show_world(rgba, native.view_tuple(camera), distant=distant, threads=threads, watch=watch)
+    return rgba
+
+
 def _mesh_arguments(core: Any, scene: TracedScene, threads: int, watch: Watch) -> tuple[Any, FloatArray, IntArray]:
     """The tree of the triangles, their normals and their materials, behind those of the fluid."""
     meshes = scene.meshes

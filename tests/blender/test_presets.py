@@ -44,10 +44,23 @@ def test_an_own_preset_gives_back_what_was_kept_and_can_be_removed(meniscus, emp
     assert not file.exists()
 
 
-def test_presets_of_both_kinds_set_all_of_the_look(meniscus):
-    module = f"{meniscus.__name__}.addon.blender"
-    presets, panels = (importlib.import_module(f"{module}.{name}") for name in ("presets", "panels"))
+def test_own_presets_keep_all_of_the_look(meniscus):
+    panels = importlib.import_module(f"{meniscus.__name__}.addon.blender.panels")
     kept = {value.rpartition(".")[2] for value in panels.MENISCUS_OT_add_preset.preset_values}
     look = {name for names in panels._LOOK_SETTINGS.values() for name in names} | {"style"}
     assert look <= kept
-    assert look <= set(presets._SETTINGS)
+
+
+@pytest.mark.parametrize("name", ["water", "slime", "mercury", "molecules"])
+def test_a_preset_leaves_nothing_of_the_one_before(meniscus, empty_scene, name):
+    """Neither of how viewports are coloured nor of how renders trace light."""
+    settings = empty_scene.meniscus
+    bpy.ops.meniscus.apply_preset(preset=name)
+    expected = values(settings)
+    assert settings.use_tracing
+    for other in ("water", "slime", "mercury", "molecules"):
+        bpy.ops.meniscus.apply_preset(preset=other)
+    settings.use_tracing = settings.use_tracing_shadows = False
+    settings.tracing_samples, settings.tracing_occlusion_distance, settings.render_style = 7, 3.0, "normal"
+    bpy.ops.meniscus.apply_preset(preset=name)
+    assert values(settings) == expected

@@ -30,7 +30,7 @@ mod meniscus_native {
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
     #[pymodule_export]
-    use super::tracing::{Triangles, WorldImage, trace_image};
+    use super::tracing::{Triangles, WorldImage, show_world, trace_image};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

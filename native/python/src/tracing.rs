@@ -86,6 +86,27 @@ impl WorldImage {
     }
 }
 
+/// Fills an image with what is seen of the world.
+///
+/// rgba (height, width, 4) float32, opaque. distant: as for `trace_image`.
+#[pyfunction]
+#[pyo3(signature = (rgba, view, *, distant, threads=0, watch=None))]
+pub fn show_world<'py>(
+    python: Python<'py>,
+    rgba: &Bound<'py, PyAny>,
+    view: ViewArguments,
+    distant: WorldArguments<'py>,
+    threads: usize,
+    watch: Option<&Bound<'py, PyAny>>,
+) -> PyResult<()> {
+    let view = view_of(view);
+    let mut rgba = Pixels::<f32, 4>::borrow("rgba", rgba, [view.width, view.height])?;
+    let (color, image, turn) = &distant;
+    let world = World { color: *color, image: image.as_ref().map(|image| (&image.get().image, *turn)) };
+    let rgba = rgba.numbers().map_err(python_error)?.as_chunks_mut().0;
+    run(python, threads, watch, |job| tracing::show_world(&view, &world, rgba, job))
+}
+
 /// Traces the light of an image.
 ///
 /// rgba (height, width, 4) float32: premultiplied, what is behind, then what is seen. depth (height, width), normal

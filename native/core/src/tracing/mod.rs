@@ -3,6 +3,7 @@
 //! Where a method has found the surface of an image, light is followed back from the eye in generations: rays meet surfaces,
 //! which are shaded sixteen at a time and send further rays. The surfaces are those of the shading module.
 
+mod background;
 mod lights;
 mod paths;
 mod random;
@@ -21,6 +22,7 @@ use crate::shading::{Light, Material};
 use crate::simd::{Path, Simd, Task};
 pub use crate::tile_caster::View;
 
+pub use self::background::show_world;
 use self::paths::Tracer;
 pub use self::triangles::{NO_TRIANGLE, Triangles};
 pub use self::world::{World, WorldImage};
