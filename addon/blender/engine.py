@@ -18,8 +18,9 @@ from .read_meshes import read_meshes
 from .render_scene import Control, RenderSettings, read_view_layer
 from .rendered_view import RenderedMeshes, view_matrices
 from .view_layer_passes import cryptomatte_levels, wanted_passes
-from .viewport import draw_in_engine
+from .viewport import draw_in_engine, shows_meshes
 from .viewport_status import STATUS
+from .world_background import WorldBackground
 
 _MATTE_CHANNELS = "rgba"
 """As Cycles names them, so that they are not taken for colours."""
@@ -41,6 +42,8 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
 
+    _behind: WorldBackground | None = None
+
     def update_render_passes(self, scene: bpy.types.Scene, renderlayer: bpy.types.ViewLayer) -> None:
         """Tell the compositor which images there will be."""
         for image_pass in wanted_passes(renderlayer):
@@ -53,7 +56,12 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
     def view_update(self, _context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """Something in the scene of a Rendered viewport has changed."""
         self._shown: RenderedMeshes | None = None
-        self._world = read_lighting(depsgraph).world
+        lighting = read_lighting(depsgraph)
+        if lighting.image is None:
+            self._behind = None
+        elif self._behind is None or self._behind.lighting != lighting:
+            self._behind = WorldBackground(lighting)
+        self._world = lighting.world
 
     def view_draw(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> None:
         """Draw a Rendered viewport, scene-linear. Nothing may leave it: Blender would print it each time."""
@@ -70,7 +78,9 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         scene = depsgraph.scene
         if not scene.render.film_transparent:
             gpu.state.active_framebuffer_get().clear(color=(*self._world, 1.0))
-        if scene.meniscus.render_meshes == "NONE":
+            if self._behind is not None:
+                self._behind.draw()
+        if scene.meniscus.render_meshes == "NONE" or shows_meshes(context):
             return
         if self._shown is None:
             space = context.space_data

@@ -23,7 +23,7 @@ from ..fluid.image import ImageBuffers
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.meshes import Meshes
 from ..fluid.passes import PASSES
-from ..render.backdrop import backdrop
+from ..render.backdrop import Surroundings
 from ..render.deep import render_deep
 from ..render.image_memory import ImageMemory
 from ..render.method import timed
@@ -31,8 +31,7 @@ from ..render.pass_images import needed_attributes
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
 from ..render.samples import sample_offset
-from ..render.surroundings import Backdrop, Color, Motion
-from ..render.tracing import world_seen
+from ..render.surroundings import Backdrop, Motion
 from .ball_part import FloatArray
 from .fluid_motion import needs_neighbors, with_motion
 from .moving import may_move
@@ -140,33 +139,17 @@ class _Moment:
     fluid: Fluid
     field: Field
     look: Look
-    background: Color
-    meshes: Meshes | None
-    are_holdouts: bool
+    surroundings: Surroundings
 
     @property
     def object_names(self) -> tuple[str, ...]:
-        others = self.meshes.objects if self.meshes is not None else ()
+        meshes = self.surroundings.meshes
+        others = meshes.objects if meshes is not None else ()
         return tuple(item.name for item in (*self.look.sources, *others))
 
     def backdrop(self, camera: Camera, threads: int, control: Control, motion: Motion | None = None) -> Backdrop | None:
         """What else than fluid is seen, with its motion where that is given; None where that is nothing."""
-        camera, lighting, background = camera.cropped(), self.look.lighting, self.background
-        is_opaque = background[3] > 0
-        if is_opaque and lighting.image is not None:
-            background = world_seen(camera, lighting, threads, control.watch)
-        if self.meshes is None or not len(self.meshes):
-            return Backdrop.empty(camera, background) if is_opaque else None
-        return backdrop(
-            self.meshes,
-            camera,
-            lighting,
-            background,
-            self.are_holdouts,
-            threads=threads,
-            watch=control.watch,
-            motion=motion,
-        )
+        return self.surroundings.backdrop(camera.cropped(), threads, control.watch, motion)
 
 
 @dataclass(frozen=True)
@@ -344,9 +327,7 @@ class _Reader:
             fluid=fluid,
             field=read_field(scene),
             look=replace(self._look(), sources=fluid.sources, lighting=lighting),
-            background=(0.0, 0.0, 0.0, 0.0) if is_clear else (*lighting.world, 1.0),
-            meshes=meshes,
-            are_holdouts=settings.render_meshes == "HOLDOUT",
+            surroundings=Surroundings(meshes, lighting, is_clear, are_holdouts=settings.render_meshes == "HOLDOUT"),
         )
 
     def _look(self) -> Look:

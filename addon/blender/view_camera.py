@@ -20,7 +20,7 @@ class ViewCamera:
     Attributes
     ----------
     camera
-        Of the whole viewport; its region is the part in which there may be fluid. In an orthographic view its eye is moved
+        Of the whole viewport; its region is the part in which there may be something. In an orthographic view its eye is moved
         forward to where the fluid begins: Blender's lies as far from it as the view reaches, and depths would lose digits.
     depth_offset
         How far the eye was moved: planar depths from Blender's eye are this much greater.
@@ -51,7 +51,7 @@ class ViewCamera:
 def view_camera(
     view_from_world: npt.ArrayLike, projection: npt.ArrayLike, width: int, height: int, bounds: FloatArray
 ) -> ViewCamera | None:
-    """The camera of a view; None where no fluid can be in it.
+    """The camera of a view; None where nothing can be in it.
 
     Parameters
     ----------
@@ -60,21 +60,22 @@ def view_camera(
     width, height
         Size of the viewport in pixels.
     bounds
-        (2, 3): the box around the fluid, world space.
+        (2, 3): the box around what is to be seen, world space.
 
     Raises
     ------
     InputError
         The matrices are not those of a perspective or an orthographic view.
     """
-    seen = _whole_view(view_from_world, projection, width, height, bounds)
+    seen = whole_view(view_from_world, projection, width, height, bounds)
     region = seen.camera.region_of(bounds)
     return None if region is None else replace(seen, camera=replace(seen.camera, region=region))
 
 
-def _whole_view(
+def whole_view(
     view_from_world: npt.ArrayLike, projection: npt.ArrayLike, width: int, height: int, bounds: FloatArray
 ) -> ViewCamera:
+    """The same, whatever is in it."""
     matrix = np.asarray(projection, np.float64)
     world_from_view = rigid(np.linalg.inv(np.asarray(view_from_world, np.float64)))
     if matrix[3, 3] == 0:

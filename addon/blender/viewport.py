@@ -15,11 +15,14 @@ from dataclasses import dataclass, field, replace
 import bpy
 import gpu
 import numpy as np
+import numpy.typing as npt
 from bpy.app.handlers import persistent
 
 from ..fluid.balls import Balls
 from ..fluid.errors import MeniscusError
 from ..fluid.look import LOOK_STYLES, Look
+from ..fluid.meshes import Meshes
+from ..render.backdrop import Surroundings
 from ..render.live_view import LiveRenderer, LiveView, View
 from ..render.method import timed
 from .changes import CHANGES
@@ -30,6 +33,8 @@ from .presenter import UNCHANGED, Place, Presenter
 from .read_lighting import read_lighting
 from .read_scene import read_field, read_look
 from .scene_balls import SceneBalls
+from .scene_notes import collected_notes
+from .surroundings_of_view import ViewSurroundings
 from .texture_sharing import SHARING
 from .view_camera import ViewCamera, view_camera
 from .view_transform import ViewTransforms
@@ -55,6 +60,8 @@ class _Viewport:
         What it looked through last, and by which numbers.
     look
         The look that was drawn last.
+    notes
+        Sentences on what could not be read as it is.
     """
 
     live: LiveView
@@ -63,14 +70,15 @@ class _Viewport:
     seen: ViewCamera | None = None
     seen_by: tuple[object, ...] = ()
     look: Look | None = None
+    notes: tuple[str, ...] = ()
 
-    def look_at(self, balls: Balls) -> ViewCamera | None:
-        """The view that Blender is drawing; None where no ball is in it."""
+    def look_at(self, balls: Balls, meshes: Meshes | None) -> ViewCamera | None:
+        """The view that Blender is drawing; None where neither balls nor meshes, which images are to show, are in it."""
         _, _, *size = gpu.state.viewport_get()
         matrices = gpu.matrix.get_model_view_matrix(), gpu.matrix.get_projection_matrix()
-        seen_by = (*matrices, *size, balls)
+        seen_by = (*matrices, *size, balls, meshes)
         if seen_by != self.seen_by:
-            self.seen, self.seen_by = view_camera(*matrices, *size, balls.bounds), seen_by
+            self.seen, self.seen_by = view_camera(*matrices, *size, _bounds(balls, meshes)), seen_by
         return self.seen
 
     def drawable(self, look: Look, view: View) -> Look:
@@ -86,6 +94,7 @@ class ViewportDrawing:
     def __init__(self) -> None:
         self._renderer = LiveRenderer()
         self._scene_balls = SceneBalls(CHANGES)
+        self._surroundings = ViewSurroundings(CHANGES)
         self._viewports: dict[int, _Viewport] = {}
         self._dropped: list[_Viewport] = []
         self._transforms = ViewTransforms()
@@ -112,6 +121,7 @@ class ViewportDrawing:
         for key in list(self._viewports):
             self._drop(key)
         self._scene_balls.forget()
+        self._surroundings.forget()
         self._paused_at = None
         STATUS.clear()
 
@@ -159,22 +169,26 @@ class ViewportDrawing:
         STATUS.report(problem, details)
 
     def _draw_fluid(self, context: bpy.types.Context, key: int, started: float) -> None:
-        look = read_look(context.scene, _style(context))
+        look = _look(context)
         uses_scene = LOOK_STYLES[look.style].uses_scene
         depsgraph = context.view_layer.depsgraph
         fluid = self._scene_balls.fluid(depsgraph, context.space_data, uses_scene)
         if fluid is None:
             self._show_nothing(key)
             return
-        balls = fluid.balls
-        if uses_scene:
-            look = replace(look, sources=fluid.sources, lighting=read_lighting(depsgraph, context.space_data))
+        balls, surroundings = fluid.balls, None
+        with collected_notes() as notes:
+            if uses_scene:
+                look = replace(look, sources=fluid.sources, lighting=read_lighting(depsgraph, context.space_data))
+            if look.tracing is not None:
+                surroundings = self._surroundings.of(context, depsgraph, look.lighting)
         viewport = self._viewport(key)
-        seen = viewport.look_at(balls)
+        viewport.notes = (*fluid.notes, *notes)
+        seen = viewport.look_at(balls, None if surroundings is None else surroundings.meshes)
         if seen is None:
             viewport.drawn = viewport.live.revision
             return
-        view = _view(context.scene, balls, seen, look)
+        view = _view(context.scene, balls, seen, look, surroundings)
         if view.backend != "cpu":
             SHARING.begin()
         viewport.live.show(view)
@@ -215,7 +229,7 @@ class ViewportDrawing:
     def _report(self, viewport: _Viewport, balls: Balls) -> None:
         pictures = viewport.live.pictures
         if pictures:
-            STATUS.show(pictures[0].image.info, balls.dropped_text, self._transforms.problem)
+            STATUS.show(pictures[0].image.info, balls.dropped_text, self._transforms.problem, *viewport.notes)
         STATUS.report(*(viewport.live.failure or ("", "")))
 
     def _tick(self) -> float | None:
@@ -253,7 +267,21 @@ def _style(context: bpy.types.Context) -> str:
     return str(settings.render_style if is_engine_view(context) else settings.style)
 
 
-def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) -> View:
+def _look(context: bpy.types.Context) -> Look:
+    """How a viewport colours fluid."""
+    choices = {} if context.scene.meniscus.use_preview_tracing else {"use_tracing": False}
+    return read_look(context.scene, _style(context), choices)
+
+
+def _bounds(balls: Balls, meshes: Meshes | None) -> npt.NDArray[np.float64]:
+    """(2, 3): the box around what images are to show, world space."""
+    if meshes is None or not len(meshes.seen):
+        return balls.bounds
+    low, high = (np.array(sides) for sides in zip(balls.bounds, meshes.seen.bounds, strict=True))
+    return np.array([low.min(axis=0), high.max(axis=0)])
+
+
+def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look, surroundings: Surroundings | None) -> View:
     settings, chosen, style = scene.meniscus, preferences(), LOOK_STYLES[look.style]
     return View(
         balls,
@@ -265,6 +293,7 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look) ->
         if look.depth_contrast > 0 and style.is_lit and not style.uses_scene
         else None,
         look=look if style.uses_scene else None,
+        surroundings=surroundings,
         method=settings.method,
         backend=backend_of(scene),
         threads=chosen.threads,
@@ -305,6 +334,13 @@ def _redraw_sidebar(area: bpy.types.Area) -> None:
 
 
 _drawing: ViewportDrawing | None = None
+
+
+def shows_meshes(context: bpy.types.Context) -> bool:
+    """Whether the fluid's images of a viewport of the render engine show the meshes, too."""
+    settings = context.scene.meniscus
+    is_drawn = _drawing is not None and CHANGES.may_have_sources and settings.use_viewport
+    return is_drawn and settings.render_meshes == "SHADED" and _look(context).tracing is not None
 
 
 def draw_in_engine(context: bpy.types.Context) -> None:

@@ -61,9 +61,9 @@ class MeshPart:
     world_from_object: npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Meshes:
-    """Triangles, world space, Blender units.
+    """Triangles, world space, Blender units; two are the same only where they are one.
 
     Attributes
     ----------
@@ -131,6 +131,16 @@ class Meshes:
     def traced(self) -> Meshes:
         """Those of the triangles that traced light meets; vertices, objects and materials stay what they are."""
         return self._those([item.is_traced for item in self.objects])
+
+    @cached_property
+    def unseen(self) -> Meshes:
+        """The same, seen by no camera."""
+        return replace(self, objects=tuple(replace(item, is_seen=False) for item in self.objects))
+
+    @cached_property
+    def bounds(self) -> npt.NDArray[np.float64]:
+        """(2, 3): the box around the vertices; there must be some."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], np.float64)
 
     def _those(self, are_wanted: list[bool]) -> Meshes:
         if all(are_wanted):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .errors import InputError
 
@@ -42,6 +42,17 @@ class Tracing:
     occlusion_rays: int = 0
     occlusion_distance: float = float("inf")
     samples: int = 1
+
+    @property
+    def hurried(self) -> Tracing:
+        """The same with less work, for what is seen a moment only: noisier, and light goes less far."""
+        return replace(
+            self,
+            reflections=min(self.reflections, 2),
+            refractions=min(self.refractions, 4),
+            occlusion_rays=min(self.occlusion_rays, 4),
+            samples=1,
+        )
 
     def __post_init__(self) -> None:
         for name, label, least, greatest in _LIMITS:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +15,49 @@ from ..fluid.passes import DEPTH_BACKGROUND
 from . import native
 from .material_shading import shade_image
 from .surroundings import Backdrop, Color, Motion
+from .tracing import world_seen
 from .vector_math import FloatArray
 
 _HOLE = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What else than fluid there is in a scene, whoever looks at it.
+
+    Attributes
+    ----------
+    meshes
+        None where they are neither seen nor traced.
+    lighting
+        Lights and world.
+    is_film_clear
+        Whether images are transparent where the world would be seen.
+    are_holdouts
+        Whether all meshes leave holes.
+    """
+
+    meshes: Meshes | None
+    lighting: Lighting
+    is_film_clear: bool
+    are_holdouts: bool = False
+
+    def backdrop(
+        self,
+        camera: Camera,
+        threads: int = 0,
+        watch: Callable[[float], None] = native.let_interrupt,
+        motion: Motion | None = None,
+    ) -> Backdrop | None:
+        """What a camera, which has no region, sees of it; None where that is nothing. For the rest see :func:`backdrop`."""
+        background: Color | FloatArray = _HOLE if self.is_film_clear else (*self.lighting.world, 1.0)
+        if not self.is_film_clear and self.lighting.image is not None:
+            background = world_seen(camera, self.lighting, threads, watch)
+        if self.meshes is None or not len(self.meshes):
+            return None if self.is_film_clear else Backdrop.empty(camera, background)
+        return backdrop(
+            self.meshes, camera, self.lighting, background, self.are_holdouts, threads=threads, watch=watch, motion=motion
+        )
 
 
 def backdrop(

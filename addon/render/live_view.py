@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Condition, Thread
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
 from ..fluid.look import Look
+from .backdrop import Surroundings
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
@@ -53,6 +54,8 @@ class View:
         Of the depth contrast, see :class:`look.Look`; None where there is none.
     look
         Colours and light of the Combined pass; None where it is not among the passes.
+    surroundings
+        What else there is in the scene; None where the look knows nothing of that.
     method, backend, threads
         As for :func:`renderer.render`.
     samples
@@ -70,6 +73,7 @@ class View:
     uses_thickness: bool = False
     contrast_radius: float | None = None
     look: Look | None = None
+    surroundings: Surroundings | None = None
     method: str = "auto"
     backend: str = "auto"
     threads: int = 0
@@ -87,7 +91,17 @@ class View:
         )
 
     def _means(self) -> tuple[object, ...]:
-        return self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.method, self.backend
+        return (
+            *(self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.surroundings),
+            *(self.method, self.backend),
+        )
+
+    @property
+    def look_while_moving(self) -> Look | None:
+        """The look of what is shown while views change: light is followed less far, so that images stay large."""
+        if self.look is None or self.look.tracing is None:
+            return self.look
+        return replace(self.look, tracing=self.look.tracing.hurried)
 
     @property
     def most_pictures(self) -> int:
@@ -108,6 +122,8 @@ class Picture:
         Depth, normal and what else the view asks for; its camera has the size of the image.
     view
         What it shows.
+    is_hurried
+        Whether it has the look of what moves, and that is another one.
     importance
         (height, width) of the image, see :func:`depth_contrast.spatial_importance`; None where it is not needed.
     thickness
@@ -120,6 +136,7 @@ class Picture:
 
     image: ImageBuffers | DeviceImage
     view: View
+    is_hurried: bool = False
     importance: npt.NDArray[np.float32] | None = None
     thickness: npt.NDArray[np.float32] | None = None
 
@@ -205,9 +222,16 @@ class LiveView:
             return None
         if not self._is_current():
             return 0
-        if self._pictures[0].image.camera.width < self._view.camera.width:
+        if self._is_coarse:
             return 1
         return len(self._pictures) + 1 if len(self._pictures) < self._view.most_pictures else None
+
+    @property
+    def _is_coarse(self) -> bool:
+        """Whether what is shown is to be replaced when the view rests."""
+        assert self._view is not None
+        first = self._pictures[0]
+        return first.is_hurried or first.image.camera.width < self._view.camera.width
 
     def _due(self) -> float:
         """When the next picture should be begun, by the monotonic clock."""
@@ -219,12 +243,17 @@ class LiveView:
         camera = self._view.camera
         if self._stage() == 0:
             return camera.resized(*self._pace.size(camera.width, camera.height, 1.0 / self._view.frame_rate))
-        return camera.shifted(*sample_offset(len(self._pictures) if self._stage() != 1 else 0))
+        return camera.shifted(*sample_offset(self._next_sample()))
+
+    def _next_sample(self) -> int:
+        """The number of the sample that the next picture is."""
+        return len(self._pictures) if (self._stage() or 0) > 1 else 0
 
     def _accept(self, picture: Picture, seconds: float) -> None:
         camera = picture.image.camera
-        self._pace.note(camera.width * camera.height, seconds)
-        is_next = self._is_current() and camera.width == self._pictures[0].image.camera.width
+        if picture.is_hurried or picture.view.look_while_moving == picture.view.look:
+            self._pace.note(camera.width * camera.height, seconds)
+        is_next = self._is_current() and not picture.is_hurried and not self._is_coarse
         self._pictures = [*self._pictures, picture] if is_next else [picture]
         self.revision += 1
 
@@ -275,9 +304,9 @@ class LiveRenderer:
                 live = self._next()
                 if live is None:
                     return
-                view, camera, stage = live._view, live._next_camera(), live._stage()
+                view, camera, sample, stage = live._view, live._next_camera(), live._next_sample(), live._stage()
             assert view is not None
-            self._make_picture(live, view, camera, is_first=stage == 0)
+            self._make_picture(live, view, camera, sample, is_first=stage == 0)
 
     def _next(self) -> LiveView | None:
         """The live view whose turn it is, once there is one; None when the thread is to end."""
@@ -290,9 +319,10 @@ class LiveRenderer:
             self._changed.wait(min(live._due() for live in pending) - now if pending else None)
         return None
 
-    def _make_picture(self, live: LiveView, view: View, camera: Camera, is_first: bool) -> None:
+    def _make_picture(self, live: LiveView, view: View, camera: Camera, sample: int, is_first: bool) -> None:
         # A first picture is finished whatever comes: else a viewport that changes all the time would show nothing.
         is_cancelled = (lambda: self._is_closed) if is_first else lambda: self._is_overtaken(live, view)
+        look = view.look_while_moving if is_first else view.look
         milliseconds: dict[str, float] = {}
         try:
             with timed(milliseconds, "picture"):
@@ -303,12 +333,16 @@ class LiveRenderer:
                     method=view.method,
                     backend=view.backend,
                     passes=view.passes,
-                    look=view.look,
+                    look=look,
                     is_cancelled=is_cancelled,
                     threads=view.threads,
                     is_read_back=view.contrast_radius is not None,
+                    backdrop=None
+                    if view.surroundings is None
+                    else view.surroundings.backdrop(camera, view.threads, _watch(is_cancelled)),
+                    sample=sample,
                 )
-                picture = _picture(image, view)
+                picture = _picture(image, view, is_hurried=look != view.look)
         except CancelledError:
             return
         except Exception as failure:  # noqa: BLE001 - whatever it is, the user sees it and the thread goes on
@@ -333,11 +367,21 @@ class LiveRenderer:
             )
 
 
-def _picture(image: ImageBuffers | DeviceImage, view: View) -> Picture:
+def _watch(is_cancelled: Callable[[], bool]) -> Callable[[float], None]:
+    """What native work calls."""
+
+    def watch(_share: float) -> None:
+        if is_cancelled():
+            raise CancelledError("The image is no longer wanted")
+
+    return watch
+
+
+def _picture(image: ImageBuffers | DeviceImage, view: View, is_hurried: bool) -> Picture:
     """An image with what the look needs beside it."""
     importance = thickness = None
     if view.contrast_radius is not None and isinstance(image, ImageBuffers):
         importance = spatial_importance(image["depth"], image.hit, image.camera, view.contrast_radius)
     if view.uses_thickness:
         thickness = thickness_image(view.balls, image.camera, view.field)
-    return Picture(image, view, importance, thickness)
+    return Picture(image, view, is_hurried, importance, thickness)

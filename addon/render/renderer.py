@@ -127,6 +127,8 @@ def render_to_show(
     is_cancelled: Callable[[], bool] | None = None,
     threads: int = 0,
     is_read_back: bool = False,
+    backdrop: Backdrop | None = None,
+    sample: int = 0,
 ) -> ImageBuffers | DeviceImage:
     """Render the surface of a fluid for Blender to draw.
 
@@ -138,6 +140,7 @@ def render_to_show(
     ImageBuffers.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads)
+    shot = replace(shot, backdrop=backdrop, sample=sample)
     runner = shot.choice.runner
     can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
     if can_stay and isinstance(runner, DeviceMethod) and runner.shares_textures:
