@@ -5,6 +5,7 @@ from __future__ import annotations
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
 
 from ..fluid.lighting import Lighting
 from ..render.tracing import world_seen
@@ -38,7 +39,7 @@ class WorldBackground:
         try:
             with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
                 gpu.matrix.load_identity()
-                gpu.matrix.load_projection_matrix(_IDENTITY)
+                gpu.matrix.load_projection_matrix(Matrix())
                 self._shader.bind()
                 self._shader.uniform_sampler("image", self._texture)
                 self._batch.draw(self._shader)
@@ -58,6 +59,3 @@ class WorldBackground:
         camera = whole_view(*matrices, width, height, np.zeros((2, 3))).camera
         pixels = world_seen(camera.resized(-(-width // divisor), -(-height // divisor)), self.lighting)
         self._texture, self._seen, self._is_fine = uploaded(pixels), seen, is_same
-
-
-_IDENTITY = [[float(row == column) for column in range(4)] for row in range(4)]

@@ -6,6 +6,7 @@ import pytest
 from event_loop import turns
 from expected import box
 from fluid_scenes import add_points
+from fluid_views import is_compared
 from mathutils import Euler
 from viewports import Viewport, look, make_plain
 
@@ -103,3 +104,33 @@ def test_the_render_engine_draws_its_own_viewport(fluid, ring):
     fluid.check_presence("ring_engine", ring, [CUBE])
     scene.meniscus.render_meshes = "NONE"
     fluid.check_presence("ring_engine_alone", ring)
+
+
+def test_a_rendered_viewport_traces_light(fluid, ring):
+    """Fluid casts shadows on meshes, before an image of the world, and stays where it is."""
+    scene = bpy.context.scene
+    scene.render.engine, scene.meniscus.use_tracing = "MENISCUS", True
+    scene.meniscus.preview_samples = 3
+    scene.objects["Light"].location, scene.objects["Light"].data.energy = (0.5, -0.5, 8), 3000
+    scene.objects["Light"].data.shadow_soft_size = 0.0
+    nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
+    texture = nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.new("Sky", 4, 2, float_buffer=True)
+    texture.image.pixels.foreach_set(np.tile(np.float32((0.02, 0.1, 0.02, 1)), 8))
+    links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
+    ring.space.shading.type = "RENDERED"
+    shadowed = fluid.settled(ring).astype(int)
+    labels = fluid.labels(ring, [CUBE])
+    scene.meniscus.use_tracing_shadows = False
+    lit = fluid.settled(ring).astype(int)
+    cube, inner = labels == 1, is_compared(lit, labels)
+    darker = (lit - shadowed).max(axis=2) > 20
+    assert (lit >= shadowed - 3)[inner].all()
+    assert 0.02 < darker[cube & inner].mean() < 0.9
+    assert not darker[(labels == -1) & inner].any()
+    green = shadowed[(labels == -1) & inner]
+    assert (green[:, 1] > green[:, 0] + 20).all()
+    scene.meniscus.use_preview_tracing = False
+    scene.meniscus.use_tracing_shadows = True
+    plain = fluid.settled(ring).astype(int)
+    assert ((plain - shadowed).max(axis=2) > 20)[darker & cube & inner].mean() > 0.9

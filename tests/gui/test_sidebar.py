@@ -112,7 +112,7 @@ def test_the_presets_open(drawn_panels, fluid, sidebar, meniscus):
     wait_until(lambda: "MENISCUS_PT_presets" in drawn_panels, "the presets")
 
 
-@pytest.mark.parametrize("style", ["studio", "water", "headlight", "flat", "normal", "depth", "speed", "id"])
+@pytest.mark.parametrize("style", ["studio", "water", "material", "headlight", "flat", "normal", "depth", "speed", "id"])
 def test_each_look_draws_with_its_panel(drawn_panels, fluid, sidebar, style):
     add_points(bpy.context.scene.collection, points=[(2, 0, 0)], radius=1.0)
     fluid.settled(sidebar)
