@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import ctypes
 import weakref
+from typing import Literal
 
 import moderngl
+import numpy as np
+import numpy.typing as npt
 
 from ..addon.fluid.errors import DeviceError
 from .context import GpuContext
 
 _GL_TEXTURE0 = 0x84C0
 _GL_TEXTURE_BUFFER = 0x8C2A
-_GL_RG32UI = 0x823C
-_TEXEL_BYTES = 8
+
+Texels = Literal["u1", "u2", "u4", "f1", "f4"]
+"""How many numbers of 32 bits a texel has, and which: unsigned integers or floats."""
+
+_FORMATS: dict[Texels, int] = {"u1": 0x8236, "u2": 0x823C, "u4": 0x8D70, "f1": 0x822E, "f4": 0x8814}
 
 
 class BufferTexture:
-    """Pairs of 32-bit unsigned integers.
+    """Texels of one to four numbers; pairs of 32-bit unsigned integers unless said otherwise.
 
     Attributes
     ----------
@@ -25,28 +31,44 @@ class BufferTexture:
         Where they lie.
     """
 
-    def __init__(self, context: GpuContext, capacity: int) -> None:
+    def __init__(self, context: GpuContext, capacity: int, texels: Texels = "u2") -> None:
         unsigned = ctypes.c_uint
         self._context = context
+        self._texel_bytes = 4 * int(texels[1])
         self._activate, self._bind = (
             context.function("glActiveTexture", unsigned),
             context.function("glBindTexture", unsigned, unsigned),
         )
-        self.buffer: moderngl.Buffer = context.gl.buffer(reserve=_TEXEL_BYTES * capacity, dynamic=True)
+        self.buffer: moderngl.Buffer = context.gl.buffer(reserve=self._texel_bytes * capacity, dynamic=True)
         name = unsigned()
         context.function("glGenTextures", ctypes.c_int, ctypes.c_void_p)(1, ctypes.byref(name))
         self._name = name.value
         weakref.finalize(self, context.delete_texture, self._name)
         self.use(0)
-        context.function("glTexBuffer", unsigned, unsigned, unsigned)(_GL_TEXTURE_BUFFER, _GL_RG32UI, self.buffer.glo)
+        context.function("glTexBuffer", unsigned, unsigned, unsigned)(_GL_TEXTURE_BUFFER, _FORMATS[texels], self.buffer.glo)
+
+    @classmethod
+    def of(cls, context: GpuContext, texels: Texels, array: npt.NDArray[np.float32] | npt.NDArray[np.uint32]) -> BufferTexture:
+        """The numbers of an array; DeviceError where they are more than a shader can read."""
+        count = array.size // int(texels[1])
+        limit = context.limits.texture_buffer_size
+        if count > limit:
+            raise DeviceError(
+                f"{count} texels are needed at once but {context.renderer} takes at most {limit}; "
+                "show fewer balls, or choose another method"
+            )
+        texture = cls(context, max(count, 1), texels)
+        if array.size:
+            texture.buffer.write(np.ascontiguousarray(array))
+        return texture
 
     @property
     def capacity(self) -> int:
-        """How many pairs it holds."""
-        return int(self.buffer.size) // _TEXEL_BYTES
+        """How many texels it holds."""
+        return int(self.buffer.size) // self._texel_bytes
 
     def reserve(self, count: int) -> None:
-        """Make room for `count` pairs; what was in the buffer is lost where there was not enough.
+        """Make room for `count` texels; what was in the buffer is lost where there was not enough.
 
         DeviceError where it is more than a shader can read.
         """
@@ -57,7 +79,7 @@ class BufferTexture:
                 "choose another method"
             )
         if count > self.capacity:
-            self.buffer.orphan(_TEXEL_BYTES * count)
+            self.buffer.orphan(self._texel_bytes * count)
 
     def use(self, unit: int) -> None:
         """Bind it to a texture unit."""

@@ -41,7 +41,7 @@ class Storage:
             )
         return self._context.gl.buffer(reserve=max(size, _LEAST_BYTES))
 
-    def of(self, array: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> moderngl.Buffer:
+    def of(self, array: npt.NDArray[np.float32] | npt.NDArray[np.int32] | npt.NDArray[np.uint32]) -> moderngl.Buffer:
         """A buffer with the numbers of an array."""
         buffer = self.reserve(array.nbytes)
         if array.nbytes:

@@ -36,7 +36,7 @@ AREAS = (
     Area("addon/output", ("addon/fluid", "addon/output"), frozenset({"numpy", "OpenEXR"})),
     Area("addon/render", ("addon/fluid", "addon/render", "gpu_shaders"), frozenset({"numpy", "meniscus_native"})),
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
-    Area("gpu_shaders", ("addon/fluid", "addon/render/method", "gpu_shaders"), OPENGL | {"numpy"}),
+    Area("gpu_shaders", ("addon/fluid", "addon/render/method", "addon/render/fitted_bvh", "gpu_shaders"), OPENGL | {"numpy"}),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),
 )
 

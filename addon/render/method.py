@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
@@ -20,6 +20,9 @@ from .image_memory import ImageMemory
 
 Backend = Literal["gpu", "cpu"]
 Attribute = Literal["color", "velocity", "ball"]
+
+ATTRIBUTES: tuple[Attribute, ...] = ("color", "velocity", "ball")
+"""In the order in which they are written."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,12 @@ class Request:
     watch: Callable[[float], None]
     memory: ImageMemory = dataclasses.field(default_factory=ImageMemory)
 
+    @property
+    def known_attributes(self) -> tuple[Attribute, ...]:
+        """The attributes that are asked for and that the balls carry, in their order."""
+        carried = {"color": self.balls.colors, "velocity": self.balls.velocities, "ball": self.balls}
+        return tuple(name for name in ATTRIBUTES if name in self.attributes and carried[name] is not None)
+
 
 @dataclass
 class Surface:
@@ -99,6 +108,19 @@ class Surface:
     ball: npt.NDArray[np.int32] | None = None
     milliseconds: dict[str, float] = dataclasses.field(default_factory=dict)
     counts: dict[str, int] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def background(cls, camera: Camera, attributes: Collection[Attribute] = ()) -> Surface:
+        """The surface of nothing, to be filled."""
+        shape = camera.height, camera.width
+        surface = cls(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32))
+        if "color" in attributes:
+            surface.color = np.zeros((*shape, 3), np.float32)
+        if "velocity" in attributes:
+            surface.velocity = np.zeros((*shape, 3), np.float32)
+        if "ball" in attributes:
+            surface.ball = np.full(shape, -1, np.int32)
+        return surface
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:

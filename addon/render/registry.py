@@ -16,6 +16,7 @@ _PACKAGE = __package__.rpartition(".addon.")[0]
 _FOLDERS = (
     "gpu_shaders.methods.tile_lists",
     "addon.render.tile_caster",
+    "gpu_shaders.methods.fitted_bvh",
     "gpu_shaders.methods.depth_peeling",
 )
 

@@ -13,7 +13,7 @@ def _image(meniscus, method):
     return meniscus.render(balls, camera, meniscus.Field(), method=method, passes=("depth", "normal", "combined"))
 
 
-GPU_METHODS = ("tile_lists", "depth_peeling")
+GPU_METHODS = ("tile_lists", "fitted_bvh", "depth_peeling")
 
 
 @pytest.mark.parametrize("method", GPU_METHODS)
@@ -34,4 +34,4 @@ def test_rendering_again_and_again_gives_the_same(meniscus, method):
 
 def test_every_method_says_whether_it_runs_here(meniscus):
     problems = {status.name: status.problem for status in meniscus.methods()}
-    assert problems == {"tile_lists": "", "tile_caster": "", "depth_peeling": ""}
+    assert problems == {"tile_lists": "", "tile_caster": "", "fitted_bvh": "", "depth_peeling": ""}

@@ -94,7 +94,10 @@ def test_cancelling_stops_the_render():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "marching_cubes"}, "Unknown method 'marching_cubes': choose auto, tile_lists, tile_caster, depth_peeling"),
+        (
+            {"method": "marching_cubes"},
+            "Unknown method 'marching_cubes': choose auto, tile_lists, tile_caster, fitted_bvh, depth_peeling",
+        ),
         ({"backend": "tpu"}, "Unknown back-end 'tpu'"),
         ({"method": "depth_peeling", "backend": "cpu"}, "runs on the back-end 'gpu', not on 'cpu'"),
         ({"passes": ("dpeth",)}, "Unknown pass 'dpeth'"),
@@ -111,7 +114,7 @@ def no_opengl(monkeypatch):
         raise DeviceError("OpenGL 3.3 is not available here")
 
     monkeypatch.setattr(registry.gpu(), "shared_context", fail)
-    for name in ("tile_lists", "depth_peeling"):
+    for name in ("tile_lists", "fitted_bvh", "depth_peeling"):
         monkeypatch.setattr(registry._import(f"gpu_shaders.methods.{name}", "method"), "create", fail)
 
 
@@ -147,6 +150,7 @@ def test_without_opengl_the_gpu_says_why_not(no_opengl):
         render(backend="gpu")
     problems = {status.name: status.problem for status in meniscus.methods()}
     assert "not available" in problems["tile_lists"]
+    assert "not available" in problems["fitted_bvh"]
     assert "not available" in problems["depth_peeling"]
     assert not problems["tile_caster"]
 
@@ -218,4 +222,4 @@ def test_a_missing_package_of_opengl_is_one_sentence(monkeypatch):
     monkeypatch.setattr(registry.importlib, "import_module", import_module)
     with pytest.raises(DeviceError, match=r"a package is missing \(No module named 'moderngl'\); reinstall the extension"):
         render(backend="auto", method="depth_peeling")
-    assert [bool(status.problem) for status in meniscus.methods()] == [True, False, True]
+    assert [bool(status.problem) for status in meniscus.methods()] == [True, False, True, True]

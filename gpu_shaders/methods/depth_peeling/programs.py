@@ -125,7 +125,8 @@ def all_programs() -> Iterator[ProgramSource]:
 
 
 def _program(name: str, vertex: str, fragment: str, **constants: object) -> ProgramSource:
-    files = f"{FOLDER}/{vertex}.vert", f"{FOLDER}/{fragment}.frag"
+    folder = "lib" if vertex == "screen" else FOLDER
+    files = f"{folder}/{vertex}.vert", f"{FOLDER}/{fragment}.frag"
     return ProgramSource(name, *files, constants=tuple(sorted(constants.items())))
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import moderngl
 
 from ....addon.fluid.camera import Camera
@@ -13,6 +9,7 @@ from ....addon.fluid.field import Field
 from ...camera_parts import camera_uniforms
 from ...compute_step import ComputeStep
 from ...context import GpuContext
+from ...stage_times import StageTimes
 from ...surface_textures import SurfaceTextures
 from .balls import BallBuffers, kernel_shares, least_x
 from .memory import FILL_GROUPS_OFFSET, LONG_GROUPS_OFFSET, LONGEST_GROUPS_OFFSET, Memory
@@ -61,7 +58,7 @@ class Frame:
             }
         )
         for _ in range(_MOST_TRIES):
-            times = _Times(self._context)
+            times = StageTimes(self._context)
             self._begin({**balls.buffers, 4: self._shares, 12: least})
             self._make_lists(len(balls.balls), times)
             self._cast(textures, times)
@@ -89,7 +86,7 @@ class Frame:
         for binding, buffer in buffers.items():
             buffer.bind_to_storage_buffer(binding)
 
-    def _make_lists(self, count: int, times: _Times) -> None:
+    def _make_lists(self, count: int, times: StageTimes) -> None:
         memory, steps = self._memory, self._steps
         with times.of("occlude"):
             known = memory.known_among(count)
@@ -123,38 +120,8 @@ class Frame:
             columns, rows = (-(-side // 2**level) for side in grid.cells)
             steps["pyramid"].run(-(-columns // 16), -(-rows // 16))
 
-    def _cast(self, textures: SurfaceTextures, times: _Times) -> None:
+    def _cast(self, textures: SurfaceTextures, times: StageTimes) -> None:
         for name, texture in textures.textures.items():
             texture.bind_to_image(_IMAGES[name], read=name in ("depth", "normal"), write=True)
         with times.of("cast"):
             self._steps["cast"].run(-(-self._camera.width // 8), -(-self._camera.height // 4))
-
-
-class _Times:
-    """How long each stage takes: by the graphics processor's timers, or by the clock where OpenGL is software."""
-
-    def __init__(self, context: GpuContext) -> None:
-        self._context = context
-        self._queries: dict[str, moderngl.Query] = {}
-        self._seconds: dict[str, float] = {}
-
-    @contextmanager
-    def of(self, stage: str) -> Iterator[None]:
-        """Measure a stage."""
-        gl = self._context.gl
-        if self._context.is_software:  # its timers know nothing of compute shaders
-            gl.finish()
-            start = time.perf_counter()
-            yield
-            gl.finish()
-            self._seconds[stage] = time.perf_counter() - start
-        else:
-            self._queries[stage] = query = gl.query(time=True)
-            with query:
-                yield
-
-    @property
-    def milliseconds(self) -> dict[str, float]:
-        """By stage; waits for them."""
-        by_timers = {stage: query.elapsed / 1e6 for stage, query in self._queries.items()}
-        return by_timers or {stage: 1e3 * seconds for stage, seconds in self._seconds.items()}

@@ -7,13 +7,10 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
-import numpy as np
-
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.errors import MeniscusError
 from ....addon.fluid.kernels import KERNELS, Kernel
-from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import Attribute, Request, Surface, timed
 from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
@@ -33,7 +30,6 @@ _STORAGE_BLOCKS = 16
 """Binding points that are used."""
 
 _PIXELS_A_PART = 1 << 23
-_ATTRIBUTES: tuple[Attribute, ...] = ("color", "velocity", "ball")
 
 
 class TileLists:
@@ -73,8 +69,8 @@ class TileLists:
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""
-        attributes = _wanted(request)
-        surface = _background(request.camera, attributes)
+        attributes = request.known_attributes
+        surface = Surface.background(request.camera, attributes)
         if len(request.balls):
             with timed(surface.milliseconds, "surface"):
                 for region in self._parts(request.camera):
@@ -117,7 +113,7 @@ class TileLists:
 
     def _find_on_device(self, request: Request) -> SurfaceTextures:
         """On the context's thread."""
-        camera, attributes = request.camera, _wanted(request)
+        camera, attributes = request.camera, request.known_attributes
         textures = SurfaceTextures(self._context, (camera.width, camera.height), attributes)
         if len(request.balls):
             self._find(request, attributes, camera, textures)
@@ -184,22 +180,3 @@ class TileLists:
 def create() -> TileLists:
     """The method on the process's context; raises DeviceError where there is none that can run it."""
     return shared_context().kept(TileLists)
-
-
-def _wanted(request: Request) -> tuple[Attribute, ...]:
-    """The attributes that are asked for and known."""
-    known = {"color": request.balls.colors, "velocity": request.balls.velocities, "ball": request.balls}
-    return tuple(name for name in _ATTRIBUTES if name in request.attributes and known[name] is not None)
-
-
-def _background(camera: Camera, attributes: tuple[Attribute, ...]) -> Surface:
-    """The surface of nothing, to be filled."""
-    shape = camera.height, camera.width
-    surface = Surface(np.full(shape, DEPTH_BACKGROUND, np.float32), np.zeros((*shape, 3), np.float32))
-    if "color" in attributes:
-        surface.color = np.zeros((*shape, 3), np.float32)
-    if "velocity" in attributes:
-        surface.velocity = np.zeros((*shape, 3), np.float32)
-    if "ball" in attributes:
-        surface.ball = np.full(shape, -1, np.int32)
-    return surface

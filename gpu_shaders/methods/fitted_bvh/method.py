@@ -1,0 +1,222 @@
+"""Runs the shaders of Fitted BVH; see the package for what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ....addon.fluid.balls import Balls
+from ....addon.fluid.camera import Camera, Region
+from ....addon.fluid.errors import MeniscusError
+from ....addon.fluid.field import Field
+from ....addon.fluid.kernels import KERNELS
+from ....addon.render.fitted_bvh import FittedBvh, TreeArrays
+from ....addon.render.method import Attribute, Request, Surface, timed
+from ...camera_parts import camera_uniforms, image_parts
+from ...compute_step import ComputeStep
+from ...context import GpuContext, shared_context
+from ...stage_times import StageTimes
+from ...step import Step
+from ...surface_textures import SurfaceTextures
+from ...tree_buffers import TreeBuffers
+from ...tree_constants import TreeVariant
+from .params import METHOD
+from .programs import Variant
+
+Result = TypeVar("Result")
+
+_GL_TRIANGLES = 4
+_STORAGE_VERSION = 430
+_STORAGE_BLOCKS = 6
+_PIXELS_A_PART = 1 << 23
+_IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
+"""Binding points."""
+
+
+@dataclass(frozen=True)
+class _Grown:
+    """A tree over balls."""
+
+    balls: Balls
+    field: Field
+    arrays: TreeArrays
+
+    def is_of(self, request: Request) -> bool:
+        return self.balls is request.balls and self.field == request.field
+
+
+class FittedBvhMethod:
+    """The method on one OpenGL context.
+
+    Parameters
+    ----------
+    context
+        Where to run.
+    hierarchy
+        The kind of tree, see :class:`fitted_bvh.FittedBvh`; "overlapping" is there to compare with.
+    with_storage
+        Whether to use compute shaders and storage buffers; None: where there are any, in hardware.
+    """
+
+    def __init__(self, context: GpuContext, hierarchy: str = "fitted", with_storage: bool | None = None) -> None:
+        context.require(METHOD.gl_version, draw_buffers=len(_IMAGES))
+        has_storage = context.version >= _STORAGE_VERSION and context.limits.storage_blocks >= _STORAGE_BLOCKS
+        self._context = context
+        self._hierarchy = hierarchy
+        # In software fragment shaders are several times as fast.
+        self._with_storage = has_storage and not context.is_software if with_storage is None else with_storage
+        self._steps: dict[Variant, Step | ComputeStep] = {}
+        self._tree: _Grown | None = None
+        self._buffers: TreeBuffers | None = None
+        # A driver that rejects the shaders is to be known before the method is chosen.
+        context.run(lambda: self._step_of(Variant(KERNELS["wyvill"], TreeVariant(self._with_storage))))
+
+    @property
+    def device(self) -> str:
+        """What the driver calls the graphics processor."""
+        return str(self._context.renderer)
+
+    @property
+    def shares_textures(self) -> bool:
+        """See :meth:`method.DeviceMethod.shares_textures`."""
+        return self._context.shares
+
+    def find_surface(self, request: Request) -> Surface:
+        """See :meth:`method.Method.find_surface`."""
+        surface = Surface.background(request.camera, request.known_attributes)
+        if len(request.balls):
+            tree = self._tree_of(request, surface.milliseconds)
+            with timed(surface.milliseconds, "surface"):
+                limits = self._context.limits
+                longest = min(limits.texture_size, limits.viewport_size)
+                for region in image_parts(request.camera, _PIXELS_A_PART, longest):
+                    request.watch(region.y_min / request.camera.height)
+                    self._run(partial(self._find_part, request, tree, region, surface))
+        return surface
+
+    def find_surface_on_device(self, request: Request) -> SurfaceTextures:
+        """See :meth:`method.DeviceMethod.find_surface_on_device`."""
+        camera = request.camera
+        milliseconds: dict[str, float] = {}
+        self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
+        tree = self._tree_of(request, milliseconds) if len(request.balls) else None
+        with timed(milliseconds, "surface"):
+            textures = self._run(lambda: self._find_on_device(request, tree))
+        textures.milliseconds |= milliseconds
+        return textures
+
+    def _run(self, work: Callable[[], Result]) -> Result:
+        """Do `work` on the context's thread; after an error nothing is kept, as the driver may have refused the memory."""
+        try:
+            return self._context.run(work)
+        except MeniscusError:
+            self._tree, self._buffers = None, None
+            raise
+
+    def _tree_of(self, request: Request, milliseconds: dict[str, float]) -> _Grown:
+        """The tree over the balls, which stays while the same balls are asked for."""
+        if self._tree is None or not self._tree.is_of(request):
+            with timed(milliseconds, "build"):
+                tree = FittedBvh(
+                    request.balls, request.field, hierarchy=self._hierarchy, threads=request.threads, watch=request.watch
+                )
+                self._tree = _Grown(request.balls, request.field, tree.arrays())
+            self._buffers = None
+        return self._tree
+
+    def _find_part(self, request: Request, tree: _Grown, region: Region, surface: Surface) -> None:
+        """Fill a part of `surface`; on the context's thread."""
+        camera = replace(request.camera, region=region).cropped()
+        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
+        self._find(request, tree, camera, textures)
+        rows, columns = slice(region.y_min, region.y_max), slice(region.x_min, region.x_max)
+        for name in textures.passes:
+            getattr(surface, name)[rows, columns] = textures.read(name)
+        for times, more in ((surface.milliseconds, textures.milliseconds), (surface.counts, textures.counts)):
+            times |= {name: times.get(name, 0) + number for name, number in more.items()}
+
+    def _find_on_device(self, request: Request, tree: _Grown | None) -> SurfaceTextures:
+        """On the context's thread."""
+        camera = request.camera
+        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
+        if tree is None:
+            textures.clear()
+        else:
+            self._find(request, tree, camera, textures)
+        # Another context sees what is finished; it could not wait for what is not.
+        self._context.gl.finish()
+        return textures
+
+    def _find(self, request: Request, tree: _Grown, camera: Camera, textures: SurfaceTextures) -> None:
+        """Fill the textures."""
+        times = StageTimes(self._context)
+        with times.of("upload"):
+            buffers = self._uploaded(tree, frozenset(request.known_attributes))
+        step = self._step_of(Variant(request.field.density_kernel, buffers.variant, request.known_attributes))
+        step.set_uniforms({**buffers.uniforms, **_uniforms(tree.arrays, camera, request.field)})
+        with times.of("cast"):
+            _cast(step, buffers, textures)
+        textures.add_report(times.milliseconds, {})
+
+    def _uploaded(self, tree: _Grown, attributes: frozenset[Attribute]) -> TreeBuffers:
+        if self._buffers is None or not self._buffers.has(attributes):
+            self._buffers = None  # its memory may be needed
+            overlaps = self._hierarchy == "overlapping"
+            self._buffers = TreeBuffers(
+                self._context, tree.arrays, tree.balls, attributes, with_storage=self._with_storage, overlaps=overlaps
+            )
+        return self._buffers
+
+    def _step_of(self, variant: Variant) -> Step | ComputeStep:
+        if variant not in self._steps:
+            kind = ComputeStep if variant.tree.with_storage else Step
+            self._steps[variant] = kind(self._context, variant.program())
+        return self._steps[variant]
+
+
+def create() -> FittedBvhMethod:
+    """The method on the process's context; raises DeviceError where there is none that can run it."""
+    return shared_context().kept(FittedBvhMethod)
+
+
+def _uniforms(tree: TreeArrays, camera: Camera, field: Field) -> dict[str, object]:
+    """A camera that begins at a plane near the tree: what is large is subtracted here, in double precision."""
+    forward = -camera.world_from_view[:3, 2]
+    depth = _first_depth(tree, camera, forward)
+    anchor = camera.eye + depth * forward - tree.origin
+    return {
+        **camera_uniforms(camera),
+        "isovalue": field.isovalue,
+        "anchor": tuple(anchor.tolist()),
+        "anchor_depth": depth,
+        "clip_depths": (camera.clip_start - depth, camera.clip_end - depth),
+    }
+
+
+def _first_depth(tree: TreeArrays, camera: Camera, forward: npt.NDArray[np.float64]) -> float:
+    """The planar depth at which the tree begins, between the clip distances."""
+    if not len(tree.nodes) or not np.all(np.isfinite(tree.nodes[0, :3])):
+        return camera.clip_start
+    sides = tree.nodes[0, [[0, 1, 2], [4, 5, 6]]].astype(np.float64)
+    corners = np.array([[sides[side, axis] for axis, side in enumerate(corner)] for corner in product((0, 1), repeat=3)])
+    nearest = float(np.min((corners + tree.origin - camera.eye) @ forward))
+    return min(max(nearest, camera.clip_start), camera.clip_end)
+
+
+def _cast(step: Step | ComputeStep, buffers: TreeBuffers, textures: SurfaceTextures) -> None:
+    """Cast the rays of all pixels."""
+    width, height = textures.size
+    if isinstance(step, ComputeStep):
+        buffers.bind()
+        for name, texture in textures.textures.items():
+            texture.bind_to_image(_IMAGES[name], read=False, write=True)
+        step.run(-(-width // 8), -(-height // 4))
+    else:
+        textures.framebuffer.viewport = (0, 0, width, height)
+        step.draw(textures.framebuffer, _GL_TRIANGLES, 3, buffers.textures)
