@@ -16,10 +16,13 @@ from .context import GpuContext
 _GL_TEXTURE0 = 0x84C0
 _GL_TEXTURE_BUFFER = 0x8C2A
 
-Texels = Literal["u1", "u2", "u4", "f1", "f4"]
-"""How many numbers of 32 bits a texel has, and which: unsigned integers or floats."""
+Texels = Literal["i1", "u1", "u2", "u4", "f1", "f4"]
+"""Which numbers of 32 bits a texel has, integers, unsigned ones or floats, and how many."""
 
-_FORMATS: dict[Texels, int] = {"u1": 0x8236, "u2": 0x823C, "u4": 0x8D70, "f1": 0x822E, "f4": 0x8814}
+Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int32] | npt.NDArray[np.uint32]
+"""Of 32 bits."""
+
+_FORMATS: dict[Texels, int] = {"i1": 0x8235, "u1": 0x8236, "u2": 0x823C, "u4": 0x8D70, "f1": 0x822E, "f4": 0x8814}
 
 
 class BufferTexture:
@@ -48,7 +51,7 @@ class BufferTexture:
         context.function("glTexBuffer", unsigned, unsigned, unsigned)(_GL_TEXTURE_BUFFER, _FORMATS[texels], self.buffer.glo)
 
     @classmethod
-    def of(cls, context: GpuContext, texels: Texels, array: npt.NDArray[np.float32] | npt.NDArray[np.uint32]) -> BufferTexture:
+    def of(cls, context: GpuContext, texels: Texels, array: Numbers) -> BufferTexture:
         """The numbers of an array; DeviceError where they are more than a shader can read."""
         count = array.size // int(texels[1])
         limit = context.limits.texture_buffer_size

@@ -31,6 +31,12 @@ class ComputeStep:
             if name not in self._values or self._values[name] != values[name]:
                 self._shader[name] = self._values[name] = values[name]
 
+    def use_textures(self, textures: Mapping[str, moderngl.Texture]) -> None:
+        """Bind textures by sampler name; image and storage bindings have numbers of their own."""
+        for unit, (name, texture) in enumerate(textures.items()):
+            self.set_uniforms({name: unit})
+            texture.use(unit)
+
     def run(self, columns: int, rows: int = 1) -> None:
         """Run groups of threads; what they write can be read by the next step."""
         self._shader.run(columns, rows)

@@ -29,6 +29,16 @@ _PARTS: dict[str, tuple[int, Texels]] = {
 _GREATEST_WEIGHT = 1e15
 """Of a ball in radii, as for the native core: the squares of the density's slopes must be floats."""
 
+_STORAGE_VERSION = 430
+_STORAGE_BLOCKS = 8
+"""Those of a tree, and what the shaders that use it may have beside it."""
+
+
+def uses_storage(context: GpuContext) -> bool:
+    """Whether storage buffers, and compute shaders that read them, are the faster way: not in software."""
+    has_storage = context.version >= _STORAGE_VERSION and context.limits.storage_blocks >= _STORAGE_BLOCKS
+    return has_storage and not context.is_software
+
 
 class TreeBuffers:
     """A tree, and what its balls carry to the surface; made and used on the context's thread.

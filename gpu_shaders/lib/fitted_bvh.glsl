@@ -227,8 +227,21 @@ bool leaf_walk(Leaf leaf, float reach, float bend, bool is_inside, out float at)
     return false;
 }
 
-// Where a segment crosses the surface between two distances.
-bool leaf_crossing(Segment segment, TreeNode node, bool is_inside, out float t) {
+// Whether the field is above the isovalue where the projections of the centres onto the ray are on average, each weighted by what it
+// adds there: if the ray meets the fluid, then most likely in this place (section 3).
+bool leaf_is_fluid_at_projections(Leaf leaf, float reach) {
+    float moments = 0.0, shares = 0.0;
+    for (uint i = 0u; i < min(met_count, uint(MET_LENGTH)); i++) {
+        float share = met[i].w * kernel_value(met[i].x);
+        moments += share * met[i].y;
+        shares += share;
+    }
+    return shares > 0.0 && leaf_value(leaf, clamp(moments / shares, -reach, reach)).field >= isovalue;
+}
+
+// Where a segment crosses the surface between two distances, any crossing where `takes_any`.
+bool leaf_crossing(Segment segment, TreeNode node, bool is_inside, bool takes_any, out float t) {
+    t = node.enter;
     float begin = node.enter, longest = node.exit - node.enter;
     for (uint i = 0u; i < MOST_STEPS; i++) {
         float end = begin + longest < node.exit ? begin + longest : node.exit;
@@ -239,6 +252,10 @@ bool leaf_crossing(Segment segment, TreeNode node, bool is_inside, out float t) 
             if (reach * bounds.sharpest > LONGEST) {
                 longest *= 0.5;
                 continue;
+            }
+            if (takes_any && !is_inside && leaf_is_fluid_at_projections(leaf, reach)) {
+                t = middle;
+                return true;
             }
             if (leaf_walk(leaf, reach, bounds.bend, is_inside, at)) {
                 t = clamp(middle + at, begin, end);
@@ -296,7 +313,7 @@ bool tree_cast(Segment segment, float begin, float end, bool asks, bool is_insid
             } else if (node.count == TREE_FULL) {
                 if (takes_any && !hit.is_inside)
                     return true;
-            } else if (leaf_crossing(segment, node, hit.is_inside, crossing)) {
+            } else if (leaf_crossing(segment, node, hit.is_inside, takes_any, crossing)) {
                 hit = TreeHit(crossing, node.link, node.count, hit.is_inside);
                 has_found = true;
 #if OVERLAPS

@@ -26,14 +26,14 @@ void main() {
         return;
     Found found = cast_pixel(vec2(pixel) + 0.5);
     imageStore(depth_image, pixel, vec4(found.depth));
-    imageStore(normal_image, pixel, vec4(found.normal, 0.0));
+    imageStore(normal_image, pixel, vec4(found.surface.normal, 0.0));
 #if WITH_COLORS
-    imageStore(color_image, pixel, vec4(found.color, 0.0));
+    imageStore(color_image, pixel, vec4(found.surface.color, 0.0));
 #endif
 #if WITH_VELOCITIES
-    imageStore(velocity_image, pixel, vec4(found.velocity, 0.0));
+    imageStore(velocity_image, pixel, vec4(found.surface.velocity, 0.0));
 #endif
 #if WITH_BALLS
-    imageStore(ball_image, pixel, ivec4(found.ball));
+    imageStore(ball_image, pixel, ivec4(found.surface.ball));
 #endif
 }

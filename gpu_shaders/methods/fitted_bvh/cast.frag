@@ -18,14 +18,14 @@ layout(location = BALL_LOCATION) out int out_ball;
 void main() {
     Found found = cast_pixel(gl_FragCoord.xy);
     out_depth = found.depth;
-    out_normal = vec4(found.normal, 0.0);
+    out_normal = vec4(found.surface.normal, 0.0);
 #if WITH_COLORS
-    out_color = vec4(found.color, 0.0);
+    out_color = vec4(found.surface.color, 0.0);
 #endif
 #if WITH_VELOCITIES
-    out_velocity = vec4(found.velocity, 0.0);
+    out_velocity = vec4(found.surface.velocity, 0.0);
 #endif
 #if WITH_BALLS
-    out_ball = found.ball;
+    out_ball = found.surface.ball;
 #endif
 }

@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 from typing import TypeVar
-
-import numpy as np
-import numpy.typing as npt
 
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
@@ -18,13 +14,14 @@ from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import KERNELS
 from ....addon.render.fitted_bvh import FittedBvh, TreeArrays
 from ....addon.render.method import Attribute, Request, Surface, timed
-from ...camera_parts import camera_uniforms, image_parts
+from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
 from ...context import GpuContext, shared_context
 from ...stage_times import StageTimes
 from ...step import Step
 from ...surface_textures import SurfaceTextures
-from ...tree_buffers import TreeBuffers
+from ...tree_buffers import TreeBuffers, uses_storage
+from ...tree_camera import tree_camera_uniforms
 from ...tree_constants import TreeVariant
 from .params import METHOD
 from .programs import Variant
@@ -32,8 +29,6 @@ from .programs import Variant
 Result = TypeVar("Result")
 
 _GL_TRIANGLES = 4
-_STORAGE_VERSION = 430
-_STORAGE_BLOCKS = 6
 _PIXELS_A_PART = 1 << 23
 _IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
 """Binding points."""
@@ -66,11 +61,9 @@ class FittedBvhMethod:
 
     def __init__(self, context: GpuContext, hierarchy: str = "fitted", with_storage: bool | None = None) -> None:
         context.require(METHOD.gl_version, draw_buffers=len(_IMAGES))
-        has_storage = context.version >= _STORAGE_VERSION and context.limits.storage_blocks >= _STORAGE_BLOCKS
         self._context = context
         self._hierarchy = hierarchy
-        # In software fragment shaders are several times as fast.
-        self._with_storage = has_storage and not context.is_software if with_storage is None else with_storage
+        self._with_storage = uses_storage(context) if with_storage is None else with_storage
         self._steps: dict[Variant, Step | ComputeStep] = {}
         self._tree: _Grown | None = None
         self._buffers: TreeBuffers | None = None
@@ -159,7 +152,7 @@ class FittedBvhMethod:
         with times.of("upload"):
             buffers = self._uploaded(tree, frozenset(request.known_attributes))
         step = self._step_of(Variant(request.field.density_kernel, buffers.variant, request.known_attributes))
-        step.set_uniforms({**buffers.uniforms, **_uniforms(tree.arrays, camera, request.field)})
+        step.set_uniforms({**buffers.uniforms, **tree_camera_uniforms(tree.arrays, camera, request.field)})
         with times.of("cast"):
             _cast(step, buffers, textures)
         textures.add_report(times.milliseconds, {})
@@ -183,30 +176,6 @@ class FittedBvhMethod:
 def create() -> FittedBvhMethod:
     """The method on the process's context; raises DeviceError where there is none that can run it."""
     return shared_context().kept(FittedBvhMethod)
-
-
-def _uniforms(tree: TreeArrays, camera: Camera, field: Field) -> dict[str, object]:
-    """A camera that begins at a plane near the tree: what is large is subtracted here, in double precision."""
-    forward = -camera.world_from_view[:3, 2]
-    depth = _first_depth(tree, camera, forward)
-    anchor = camera.eye + depth * forward - tree.origin
-    return {
-        **camera_uniforms(camera),
-        "isovalue": field.isovalue,
-        "anchor": tuple(anchor.tolist()),
-        "anchor_depth": depth,
-        "clip_depths": (camera.clip_start - depth, camera.clip_end - depth),
-    }
-
-
-def _first_depth(tree: TreeArrays, camera: Camera, forward: npt.NDArray[np.float64]) -> float:
-    """The planar depth at which the tree begins, between the clip distances."""
-    if not len(tree.nodes) or not np.all(np.isfinite(tree.nodes[0, :3])):
-        return camera.clip_start
-    sides = tree.nodes[0, [[0, 1, 2], [4, 5, 6]]].astype(np.float64)
-    corners = np.array([[sides[side, axis] for axis, side in enumerate(corner)] for corner in product((0, 1), repeat=3)])
-    nearest = float(np.min((corners + tree.origin - camera.eye) @ forward))
-    return min(max(nearest, camera.clip_start), camera.clip_end)
 
 
 def _cast(step: Step | ComputeStep, buffers: TreeBuffers, textures: SurfaceTextures) -> None:

@@ -1,0 +1,263 @@
+"""Traces the light of a surface that a method has left on the graphics processor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ...addon.fluid.balls import Balls
+from ...addon.fluid.camera import Camera
+from ...addon.fluid.field import Field
+from ...addon.fluid.lighting import Light, Lighting, Material
+from ...addon.fluid.tracing import Tracing
+from ...addon.render.fitted_bvh import TreeArrays
+from ...addon.render.method import Attribute
+from ..buffer_texture import BufferTexture
+from ..compute_step import ComputeStep
+from ..context import GpuContext
+from ..stage_times import StageTimes
+from ..step import Step, Texture
+from ..storage import Storage
+from ..surface_textures import SurfaceTextures
+from ..tree_buffers import TreeBuffers, uses_storage
+from ..tree_camera import tree_camera_uniforms
+from .programs import Variant
+
+_KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}
+_SCENE_BINDING, _SOURCES_BINDING = 6, 7
+_GL_TRIANGLES = 4
+
+_MOST_DISTANCE = 3e38
+"""Stands for no end in shaders."""
+
+
+@dataclass(frozen=True)
+class TracedFluid:
+    """What light meets.
+
+    Attributes
+    ----------
+    tree, balls, field
+        The tree over the balls; its origin is that of scene coordinates.
+    materials
+        Of the balls' sources; their colours count where the balls have none.
+    """
+
+    tree: TreeArrays
+    balls: Balls
+    field: Field
+    materials: tuple[Material, ...]
+
+
+class TracedLight:
+    """Traces light on one OpenGL context; use it within :meth:`GpuContext.run`.
+
+    Parameters
+    ----------
+    context
+        Where to run.
+    with_storage
+        Whether to use compute shaders and storage buffers; None: where there are any, in hardware.
+    """
+
+    def __init__(self, context: GpuContext, with_storage: bool | None = None) -> None:
+        self._context = context
+        self._with_storage = uses_storage(context) if with_storage is None else with_storage
+        self._steps: dict[Variant, Step | ComputeStep] = {}
+        self._fluid: TracedFluid | None = None
+        self._buffers: TreeBuffers | None = None
+        self._sources: Texture | moderngl.Buffer | None = None
+
+    def trace(
+        self,
+        surface: SurfaceTextures,
+        camera: Camera,
+        fluid: TracedFluid,
+        lighting: Lighting,
+        tracing: Tracing,
+        irradiance: npt.NDArray[np.float32] | None = None,
+        image: int = 0,
+        is_film_clear: bool = False,
+    ) -> moderngl.Texture:
+        """The light that a surface sends to the eye.
+
+        Parameters
+        ----------
+        surface, camera
+            What the image shows, whatever method has found it, and from where; the camera has no region.
+        fluid, lighting, tracing
+            What light meets, in world space, and how far it is followed.
+        irradiance
+            (h, w, 3) the irradiance over pi by normals, equirectangular, where the world has an image.
+        image
+            How many images of this view were made before: each has other samples.
+        is_film_clear
+            Whether the world that is seen straight through surfaces is left out, and makes the image transparent.
+
+        Returns
+        -------
+        (height, width, 4) float32: linear Rec.709, premultiplied; 0 where there is no surface.
+        """
+        gl = self._context.gl
+        buffers = self._uploaded(fluid)
+        balls, materials = fluid.balls, fluid.materials
+        lets_pass = any(material.transmission > 0 and material.metallic < 1 for material in materials)
+        with_image = lighting.image is not None and irradiance is not None
+        variant = Variant(
+            fluid.field.density_kernel, buffers.variant, balls.colors is not None, len(materials) > 1, lets_pass, with_image
+        )
+        step = self._step_of(variant)
+        step.set_uniforms(
+            {
+                **buffers.uniforms,
+                **tree_camera_uniforms(fluid.tree, camera, fluid.field),
+                **_uniforms(fluid, lighting, tracing, image, is_film_clear),
+            }
+        )
+        texels = scene_texels(materials, lighting, fluid.tree.origin)
+        worlds = self._world_textures(lighting, irradiance) if with_image else {}
+        output = gl.texture(surface.size, 4, dtype="f4")
+        times = StageTimes(self._context)
+        with times.of("trace"):
+            if isinstance(step, ComputeStep):
+                self._compute(step, buffers, texels, worlds, surface, output)
+            else:
+                self._draw(step, buffers, texels, worlds, surface, output)
+        surface.add_report(times.milliseconds, {})
+        return output
+
+    def _compute(
+        self,
+        step: ComputeStep,
+        buffers: TreeBuffers,
+        texels: npt.NDArray[np.float32],
+        worlds: dict[str, moderngl.Texture],
+        surface: SurfaceTextures,
+        output: moderngl.Texture,
+    ) -> None:
+        buffers.bind()
+        Storage(self._context).of(texels).bind_to_storage_buffer(_SCENE_BINDING)
+        if isinstance(self._sources, moderngl.Buffer):
+            self._sources.bind_to_storage_buffer(_SOURCES_BINDING)
+        surface.textures["depth"].bind_to_image(0, read=True, write=False)
+        surface.textures["normal"].bind_to_image(1, read=True, write=False)
+        output.bind_to_image(2, read=False, write=True)
+        step.use_textures(worlds)
+        width, height = surface.size
+        step.run(-(-width // 8), -(-height // 4))
+
+    def _draw(
+        self,
+        step: Step,
+        buffers: TreeBuffers,
+        texels: npt.NDArray[np.float32],
+        worlds: dict[str, moderngl.Texture],
+        surface: SurfaceTextures,
+        output: moderngl.Texture,
+    ) -> None:
+        textures: dict[str, Texture] = {
+            **buffers.textures,
+            **worlds,
+            "scene_tx": BufferTexture.of(self._context, "f4", texels),
+            "depth_tx": surface.textures["depth"],
+            "normal_tx": surface.textures["normal"],
+        }
+        if isinstance(self._sources, BufferTexture):
+            textures["sources_tx"] = self._sources
+        step.draw(self._context.gl.framebuffer([output]), _GL_TRIANGLES, 3, textures)
+
+    def _uploaded(self, fluid: TracedFluid) -> TreeBuffers:
+        """The tree's buffers, which stay while the same tree is asked for."""
+        if self._buffers is None or self._fluid is None or self._fluid.tree is not fluid.tree:
+            self._buffers = self._sources = None  # their memory may be needed
+            names: list[Attribute] = ["color"] if fluid.balls.colors is not None else []
+            names += ["ball"] if fluid.balls.sources is not None else []
+            attributes = frozenset(names)
+            self._buffers = TreeBuffers(
+                self._context, fluid.tree, fluid.balls, attributes, with_storage=self._with_storage
+            )
+            if fluid.balls.sources is not None:
+                self._sources = self._uploaded_sources(fluid.balls.sources)
+            self._fluid = fluid
+        return self._buffers
+
+    def _uploaded_sources(self, sources: npt.NDArray[np.int32]) -> BufferTexture | moderngl.Buffer:
+        if self._with_storage:
+            return Storage(self._context).of(sources)
+        return BufferTexture.of(self._context, "i1", sources)
+
+    def _world_textures(
+        self, lighting: Lighting, irradiance: npt.NDArray[np.float32] | None
+    ) -> dict[str, moderngl.Texture]:
+        images = {"world_tx": lighting.image.pixels if lighting.image else None, "irradiance_tx": irradiance}
+        return {name: _image_texture(self._context, image) for name, image in images.items() if image is not None}
+
+    def _step_of(self, variant: Variant) -> Step | ComputeStep:
+        if variant not in self._steps:
+            kind = ComputeStep if variant.tree.with_storage else Step
+            self._steps[variant] = kind(self._context, variant.program())
+        return self._steps[variant]
+
+
+def scene_texels(
+    materials: tuple[Material, ...], lighting: Lighting, origin: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float32]:
+    """(K, 4): materials and lights as lib/light.glsl reads them, in scene coordinates."""
+    numbers = [number for material in materials for number in _material_numbers(material)]
+    numbers += [number for light in lighting.lights for number in _light_numbers(light, origin)]
+    return np.array(numbers, np.float32).reshape(-1, 4)
+
+
+def _material_numbers(material: Material) -> list[float]:
+    color, emission, absorption = material.color, material.emission, material.absorption
+    return [
+        *(*color, material.metallic),
+        *(*emission, material.roughness),
+        *(*absorption, material.transmission),
+        *(material.ior, 0.0, 0.0, 0.0),
+    ]
+
+
+def _light_numbers(light: Light, origin: npt.NDArray[np.float64]) -> list[float]:
+    position = (np.array(light.position, np.float64) - origin).tolist()
+    return [
+        *(*position, float(_KINDS[light.kind])),
+        *(*light.direction, light.radius),
+        *(*light.power, light.area),
+        *(*light.cone, *light.size),
+        *(*light.right, float(light.is_round + 2 * light.casts_shadow)),
+    ]
+
+
+def _uniforms(fluid: TracedFluid, lighting: Lighting, tracing: Tracing, image: int, is_film_clear: bool) -> dict[str, object]:
+    radii, low_high = fluid.balls.radii, fluid.tree.nodes[0, [0, 1, 2, 4, 5, 6]]
+    farthest = float(np.abs(low_high).max(initial=0.0, where=np.isfinite(low_high)))
+    uniforms: dict[str, object] = {
+        "material_count": len(fluid.materials),
+        "light_count": len(lighting.lights),
+        "world_color": lighting.world,
+        "radius_range": (float(radii.min()), float(radii.max())),
+        "rounding": 4 * float(np.finfo(np.float32).eps) * farthest,
+        "most_reflections": tracing.reflections,
+        "most_refractions": tracing.refractions,
+        "occlusion_count": tracing.occlusion_rays,
+        "occlusion_distance": min(tracing.occlusion_distance, _MOST_DISTANCE),
+        "has_shadows": tracing.shadows,
+        "is_film_clear": is_film_clear,
+        "sample_count": tracing.samples,
+        "first_sample": image * tracing.samples & 0xFFFFFFFF,
+    }
+    if lighting.image is not None:
+        turn = np.array(lighting.image.image_from_world, np.float64)
+        uniforms["image_from_world"] = tuple(turn.T.ravel().tolist())
+    return uniforms
+
+
+def _image_texture(context: GpuContext, pixels: npt.NDArray[np.float32]) -> moderngl.Texture:
+    height, width = pixels.shape[:2]
+    texture = context.gl.texture((width, height), 3, np.ascontiguousarray(pixels, np.float32), dtype="f4")
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture
