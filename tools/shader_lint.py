@@ -47,9 +47,9 @@ CLAMP = re.compile(r"\b(?:min|clamp)\s*\(")
 
 
 def method_programs() -> list[ProgramSource]:
-    """The programs of all registered methods on OpenGL; no OpenGL is needed for it."""
-    names = [info.name for info in method_infos() if info.backend == "gpu"]
-    modules = [importlib.import_module(f"meniscus.gpu_shaders.methods.{name}.programs") for name in names]
+    """The programs of all registered methods on OpenGL, and of what works on their surfaces; no OpenGL is needed for it."""
+    names = [f"methods.{info.name}" for info in method_infos() if info.backend == "gpu"]
+    modules = [importlib.import_module(f"meniscus.gpu_shaders.{name}.programs") for name in [*names, "tracing"]]
     return [program for module in modules for program in module.all_programs()]
 
 

@@ -18,7 +18,6 @@ uniform isamplerBuffer sources_tx;
 
 uniform vec2 clip_depths;     // planar, less that of the anchor
 uniform vec2 radius_range;    // least and greatest of the balls
-uniform float rounding;       // how far a point of the scene is off where it was rounded
 uniform int most_reflections; // how many mirrors light may meet, and how many surfaces it may pass
 uniform int most_refractions;
 uniform uint occlusion_count; // rays that ask how much of the world is seen; 0 for all of it
@@ -45,6 +44,8 @@ const float DEPTH_ERROR = 4e-6;
 const float SURELY_OFF = 1e-5;
 const float MOST_LIFT = 1e-3;
 const float DISTANCE_OFF = 1e-6;
+// And by what points on rays are off where they are rounded, as a share of their coordinates and of those of the ray's start.
+const float ROUNDING = 4e-7;
 
 // What random numbers are used for; lights follow.
 const uint FACET = 0u, CHOICE = 1u, OCCLUSION = 2u, REFLECTION = 3u, REFRACTION = 4u, LIGHTS = 5u;
@@ -135,6 +136,11 @@ void trace_see_lights(Flight flight, float end) {
     }
 }
 
+float trace_rounding(vec3 start, vec3 point) {
+    vec3 most = max(abs(start), abs(point));
+    return ROUNDING * max(max(most.x, most.y), most.z);
+}
+
 // A point of the surface, seen along a ray.
 Vertex trace_vertex(Segment segment, TreeHit hit, int medium) {
     TreeSurface surface = tree_surface(segment, hit);
@@ -145,7 +151,7 @@ Vertex trace_vertex(Segment segment, TreeHit hit, int medium) {
 #endif
     vec3 position = segment.start + hit.t * segment.direction;
     float off = surface.steepness > 0.0 ? SURELY_OFF * isovalue / surface.steepness : ENDLESS;
-    float lift = min(off, MOST_LIFT * surface.radius) + DISTANCE_OFF * surface.radius + rounding;
+    float lift = min(off, MOST_LIFT * surface.radius) + DISTANCE_OFF * surface.radius + trace_rounding(segment.start, position);
     bool is_within = dot(surface.normal, segment.direction) > 0.0;
     if (is_within)
         material.ior = 1.0 / material.ior;
@@ -319,8 +325,9 @@ void trace_sample(Ray ray, float depth, vec3 outward, uint seed, uint number) {
             } else {
                 // As the image has it.
                 bool is_within = dot(outward, flight.direction) > 0.0;
-                vertex = Vertex(segment.start + t * segment.direction, is_within ? -outward : outward, error + rounding, is_within,
-                                AIR, 0, light_material(0u));
+                vec3 position = segment.start + t * segment.direction;
+                float lift = error + trace_rounding(segment.start, position);
+                vertex = Vertex(position, is_within ? -outward : outward, lift, is_within, AIR, 0, light_material(0u));
                 hit.t = t;
             }
             float way = is_eye ? hit.t + anchor_depth * ray.stretch : hit.t;

@@ -1,1 +1,1 @@
-"""Traced light on the graphics processor: shadows, reflections, refraction, ambient occlusion; docs/light.md has the formulas."""
+"""Traced light on the graphics processor: shadows, reflections, refraction, occlusion; docs/light.md has the formulas."""

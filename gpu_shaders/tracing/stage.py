@@ -176,9 +176,7 @@ class TracedLight:
             names: list[Attribute] = ["color"] if fluid.balls.colors is not None else []
             names += ["ball"] if fluid.balls.sources is not None else []
             attributes = frozenset(names)
-            self._buffers = TreeBuffers(
-                self._context, fluid.tree, fluid.balls, attributes, with_storage=self._with_storage
-            )
+            self._buffers = TreeBuffers(self._context, fluid.tree, fluid.balls, attributes, with_storage=self._with_storage)
             if fluid.balls.sources is not None:
                 self._sources = self._uploaded_sources(fluid.balls.sources)
             self._fluid = fluid
@@ -189,9 +187,7 @@ class TracedLight:
             return Storage(self._context).of(sources)
         return BufferTexture.of(self._context, "i1", sources)
 
-    def _world_textures(
-        self, lighting: Lighting, irradiance: npt.NDArray[np.float32] | None
-    ) -> dict[str, moderngl.Texture]:
+    def _world_textures(self, lighting: Lighting, irradiance: npt.NDArray[np.float32] | None) -> dict[str, moderngl.Texture]:
         images = {"world_tx": lighting.image.pixels if lighting.image else None, "irradiance_tx": irradiance}
         return {name: _image_texture(self._context, image) for name, image in images.items() if image is not None}
 
@@ -233,14 +229,12 @@ def _light_numbers(light: Light, origin: npt.NDArray[np.float64]) -> list[float]
 
 
 def _uniforms(fluid: TracedFluid, lighting: Lighting, tracing: Tracing, image: int, is_film_clear: bool) -> dict[str, object]:
-    radii, low_high = fluid.balls.radii, fluid.tree.nodes[0, [0, 1, 2, 4, 5, 6]]
-    farthest = float(np.abs(low_high).max(initial=0.0, where=np.isfinite(low_high)))
+    radii = fluid.balls.radii
     uniforms: dict[str, object] = {
         "material_count": len(fluid.materials),
         "light_count": len(lighting.lights),
         "world_color": lighting.world,
         "radius_range": (float(radii.min()), float(radii.max())),
-        "rounding": 4 * float(np.finfo(np.float32).eps) * farthest,
         "most_reflections": tracing.reflections,
         "most_refractions": tracing.refractions,
         "occlusion_count": tracing.occlusion_rays,
