@@ -81,7 +81,7 @@ vec4 waiting_origin[MOST_WAITING]; // and lobe
 vec3 waiting_direction[MOST_WAITING];
 vec3 waiting_light[MOST_WAITING];
 uvec2 waiting_bits[MOST_WAITING];
-uint waiting_count;
+uint waiting_count = 0u;
 vec3 radiance;
 vec3 behind; // the share of what lies behind everything
 

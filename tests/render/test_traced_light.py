@@ -1,0 +1,158 @@
+"""Traced light on the graphics processor shows what the native core does, from the surface of any method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from scenes import SCENES, Scene
+
+import meniscus
+from meniscus.addon.fluid.lighting import Light, Lighting, Material, WorldImage
+from meniscus.addon.fluid.tracing import Tracing
+from meniscus.addon.render import native
+from meniscus.addon.render.fitted_bvh import FittedBvh
+from meniscus.addon.render.method import Request
+from meniscus.addon.render.registry import create_method, method_infos
+from meniscus.addon.render.tracing import SeenSurface, TracedScene, trace_image
+from meniscus.gpu_shaders.tracing.stage import TracedFluid, TracedLight
+
+MEMORIES = pytest.mark.parametrize("with_storage", [False, True], ids=["textures", "storage"])
+GPU_METHODS = [info.name for info in method_infos() if info.backend == "gpu"]
+
+SUN = Light("SUN", (2.0, 1.9, 1.8), direction=(-0.4, 0.6, -0.6928203), radius=0.05)
+LAMPS = (
+    Light("POINT", (60.0, 50.0, 80.0), position=(2.0, -3.0, 2.0), radius=0.3),
+    Light("SPOT", (200.0, 100.0, 80.0), position=(-2.0, -3.0, 2.0), direction=(0.4851, 0.7276, -0.4851), cone=(0.9, 0.3)),
+    Light("AREA", (60.0, 70.0, 60.0), (1.5, -3.0, 2.5), (-0.4, 0.7, -0.5916), size=(1.0, 0.6), right=(0.8683, 0.4961, 0.0)),
+)
+SKY = Lighting((SUN,), world=(0.3, 0.4, 0.6))
+ROOM = Lighting((SUN, *LAMPS), world=(0.1, 0.1, 0.2))
+MATT = Material(color=(0.8, 0.5, 0.3), roughness=0.4)
+METAL = Material(color=(0.9, 0.8, 0.5), roughness=0.0, metallic=1.0)
+GLASS = Material(color=(0.9, 0.95, 1.0), roughness=0.0, transmission=1.0, ior=1.33, absorption=(1.5, 0.4, 0.2))
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What is traced, and the samples that it takes."""
+
+    scene: Scene
+    materials: tuple[Material, ...]
+    lighting: Lighting
+    tracing: Tracing = field(default_factory=Tracing)
+    is_film_clear: bool = False
+
+    def images(self, opengl, method="fitted_bvh", with_storage=False, projection="perspective"):
+        """(height, width, 4) by the graphics processor and by the native core, and where there is a surface."""
+        balls, camera = self.scene.balls, self.scene.camera(projection)
+        request = Request(balls, camera, self.scene.field, frozenset({"color"}), 0, lambda _: None)
+        surface = create_method(method)[1].find_surface_on_device(request)
+        stage = TracedLight(opengl, with_storage)
+        found = opengl.run(lambda: self._on_device(stage, surface, camera))
+        passes = surface.read_back()
+        return found, self._on_cpu(passes, camera), passes["depth"] < 1e9
+
+    def _on_device(self, stage, surface, camera):
+        balls, image = self.scene.balls, self.lighting.image
+        fluid = TracedFluid(FittedBvh(balls, self.scene.field).arrays(), balls, self.scene.field, self.materials)
+        irradiance = None if image is None else native.load().WorldImage(image.pixels).irradiance()
+        texture = stage.trace(surface, camera, fluid, self.lighting, self.tracing, irradiance, 3, self.is_film_clear)
+        return np.frombuffer(texture.read(), np.float32).reshape(camera.height, camera.width, 4)
+
+    def _on_cpu(self, passes, camera):
+        balls = self.scene.balls
+        exact = meniscus.render(balls, camera, self.scene.field, method="tile_caster", passes=("depth", "normal", "ball_id"))
+        hit = passes["depth"] < 1e9
+        ball = np.where(hit, np.maximum(exact["ball_id"], 0), -1).astype(np.int32)
+        source = np.zeros_like(ball) if balls.sources is None else balls.sources[np.maximum(ball, 0)]
+        colors = np.array([material.color for material in self.materials], np.float32)[source]
+        seen = SeenSurface(
+            passes["depth"].copy(), passes["normal"].copy(), passes.get("color", colors), np.where(hit, source, -1), ball
+        )
+        rgba = np.zeros((*hit.shape, 4), np.float32)
+        traced = TracedScene(balls, self.scene.field, self.materials, self.lighting)
+        trace_image(rgba, seen, camera, traced, self.tracing, image=3, is_film_clear=self.is_film_clear)
+        return rgba
+
+
+def assert_same_picture(found, wanted, hit, share=0.0):
+    """But for a share of the pixels, in which a path took another turn."""
+    assert hit.mean() > 0.05
+    assert np.ptp(wanted[hit][:, :3]) > 0.2, "the picture should show something"
+    assert np.all(np.isfinite(found))
+    assert not found[~hit].any()
+    assert np.mean(np.abs(found - wanted)[hit].max(axis=1) > 2e-3) <= share
+    np.testing.assert_allclose(found[hit].mean(axis=0), wanted[hit].mean(axis=0), rtol=2e-3, atol=1e-5)
+
+
+@MEMORIES
+@pytest.mark.parametrize("material", [MATT, METAL], ids=["matt", "metal"])
+def test_lights_and_occlusion(opengl, material, with_storage):
+    traced = Traced(SCENES["random_5000"](), (material,), ROOM, Tracing(occlusion_rays=8, occlusion_distance=0.5))
+    assert_same_picture(*traced.images(opengl, with_storage=with_storage), share=2e-3)
+
+
+def test_shadows_take_light_away(opengl):
+    traced = Traced(SCENES["random_5000"](), (MATT,), ROOM)
+    found, _, hit = traced.images(opengl)
+    without, wanted, _ = replace(traced, tracing=Tracing(shadows=False)).images(opengl)
+    assert_same_picture(without, wanted, hit, share=2e-3)
+    assert without[hit][:, :3].mean() > 1.05 * found[hit][:, :3].mean()
+
+
+@MEMORIES
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_glass(opengl, projection, with_storage):
+    traced = Traced(SCENES["ten_balls"](), (GLASS,), ROOM)
+    assert_same_picture(*traced.images(opengl, with_storage=with_storage, projection=projection), share=1e-3)
+
+
+@MEMORIES
+def test_an_image_of_the_world_and_rough_glass(opengl, with_storage):
+    pixels = np.random.default_rng(3).random((8, 16, 3), np.float32) * [[[2.0, 1.0, 0.5]]]
+    turn = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    world = WorldImage(pixels.astype(np.float32), turn)
+    rough = replace(GLASS, roughness=0.3, transmission=0.6)
+    lighting = Lighting((LAMPS[0],), world.mean, world)
+    traced = Traced(SCENES["ten_balls"](), (rough,), lighting, Tracing(samples=2, occlusion_rays=4))
+    assert_same_picture(*traced.images(opengl, with_storage=with_storage), share=2e-3)
+
+
+@MEMORIES
+def test_sources_with_materials_of_their_own(opengl, with_storage):
+    scene = SCENES["ten_balls"]()
+    balls = meniscus.Balls(scene.balls.positions, scene.balls.radii, sources=np.arange(10) % 2)
+    traced = Traced(replace(scene, balls=balls), (METAL, MATT), SKY)
+    found, wanted, hit = traced.images(opengl, with_storage=with_storage)
+    assert_same_picture(found, wanted, hit, share=5e-3)
+
+
+@pytest.mark.parametrize("method", GPU_METHODS)
+def test_the_surface_of_any_method_will_do(opengl, method):
+    scene = SCENES["ten_balls"]()
+    colors = np.random.default_rng(5).random((10, 3))
+    balls = meniscus.Balls(scene.balls.positions, scene.balls.radii, colors=colors)
+    traced = Traced(replace(scene, balls=balls), (MATT,), SKY)
+    assert_same_picture(*traced.images(opengl, method), share=2e-3)
+
+
+@pytest.mark.parametrize("name", ["far_from_origin", "radii_over_six_orders", "negative_weights"])
+def test_hard_scenes(opengl, name):
+    traced = Traced(SCENES[name](), (replace(GLASS, absorption=(0.2, 0.1, 0.1)),), SKY, Tracing(reflections=2, refractions=4))
+    assert_same_picture(*traced.images(opengl), share=5e-3)
+
+
+def test_a_clear_film_is_transparent_where_glass_is(opengl):
+    scene = Scene(meniscus.Balls([[0, 0, 0]], 1.2))
+    thin = Material(color=(1.0, 1.0, 1.0), roughness=0.0, transmission=1.0, ior=1.0)
+    found, wanted, hit = Traced(scene, (thin,), SKY, is_film_clear=True).images(opengl)
+    np.testing.assert_allclose(found[hit], wanted[hit], atol=1e-4)
+    assert np.median(found[hit][:, 3]) < 1e-3
+
+
+def test_mirrors_that_face_each_other_end_at_the_depth(opengl):
+    scene = Scene(meniscus.Balls([[-0.65, 0, 0], [0.65, 0, 0]], 1.0))
+    endless = Traced(scene, (replace(METAL, color=(1.0, 1.0, 1.0)),), SKY, Tracing(reflections=64))
+    assert_same_picture(*endless.images(opengl), share=2e-2)
