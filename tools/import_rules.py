@@ -17,6 +17,9 @@ from project import ROOT, ToolError, command_line
 BLENDER = frozenset({"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "bmesh", "imbuf", "idprop", "aud", "bgl"})
 OPENGL = frozenset({"moderngl", "glcontext"})
 
+# What the native core makes for shaders to read.
+TREES = ("addon/render/fitted_bvh", "addon/render/tree_builder")
+
 
 @dataclass(frozen=True)
 class Area:
@@ -36,7 +39,7 @@ AREAS = (
     Area("addon/output", ("addon/fluid", "addon/output"), frozenset({"numpy", "OpenEXR"})),
     Area("addon/render", ("addon/fluid", "addon/render", "gpu_shaders"), frozenset({"numpy", "meniscus_native"})),
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
-    Area("gpu_shaders", ("addon/fluid", "addon/render/method", "addon/render/fitted_bvh", "gpu_shaders"), OPENGL | {"numpy"}),
+    Area("gpu_shaders", ("addon/fluid", *TREES, "addon/render/method", "gpu_shaders"), OPENGL | {"numpy"}),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),
 )
 

@@ -26,7 +26,7 @@ from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
-from .renderer import render_to_show
+from .renderer import prepare, render_to_show
 from .samples import sample_offset
 from .thickness import thickness_image
 
@@ -36,6 +36,7 @@ SETTLE_SECONDS = 0.06
 _BYTES_PER_CHANNEL = 4
 
 Render = Callable[..., ImageBuffers | DeviceImage]
+Prepare = Callable[[Balls, Field, str, str, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +159,9 @@ class LiveView:
         A number that changes whenever there is something new to draw.
     """
 
-    def __init__(self, changed: Condition) -> None:
+    def __init__(self, changed: Condition, prepare: Prepare) -> None:
         self._changed = changed
+        self._prepare = prepare
         self._pace = Pace()
         self._view: View | None = None
         self._asked_at = 0.0
@@ -170,11 +172,16 @@ class LiveView:
     def show(self, view: View) -> None:
         """Ask for images of a view; what was asked for before is given up."""
         with self._changed:
+            # Without pictures nothing may be loaded yet, and that would take time.
+            is_next = bool(self._pictures) and self._view is not None and view.balls is not self._view.balls
             if view.shows_the_same(self._view):
                 self._view = view
             else:
                 self._view, self._failure, self._asked_at = view, None, time.monotonic()
             self._changed.notify_all()
+        if is_next:
+            # The thread may still draw what was asked for before.
+            self._prepare(view.balls, view.field, view.method, view.backend, view.threads)
 
     def wait(self, seconds: float) -> bool:
         """Wait until there is a picture of the view that was asked for last, or a failure; whether that came in time."""
@@ -269,10 +276,12 @@ class LiveRenderer:
     ----------
     render
         What makes an image, as :func:`renderer.render_to_show`.
+    prepare
+        What begins to make ready for the next balls, as :func:`renderer.prepare`.
     """
 
-    def __init__(self, render: Render = render_to_show) -> None:
-        self._render = render
+    def __init__(self, render: Render = render_to_show, prepare: Prepare = prepare) -> None:
+        self._render, self._prepare = render, prepare
         self._changed = Condition()
         self._views: list[LiveView] = []
         self._is_closed = False
@@ -282,7 +291,7 @@ class LiveRenderer:
     def open(self) -> LiveView:
         """A new live view."""
         with self._changed:
-            self._views.append(LiveView(self._changed))
+            self._views.append(LiveView(self._changed, self._prepare))
             return self._views[-1]
 
     def drop(self, live: LiveView) -> None:

@@ -203,6 +203,15 @@ class DeviceMethod(Method, Protocol):
         ...
 
 
+@runtime_checkable
+class PreparingMethod(Method, Protocol):
+    """A method that needs something of the balls that takes time to make."""
+
+    def prepare(self, balls: Balls, field: Field, threads: int) -> None:
+        """Begin to make what images of these balls will need, and return at once; what was begun for others is given up."""
+        ...
+
+
 @contextmanager
 def timed(milliseconds: dict[str, float], stage: str) -> Iterator[None]:
     """Note how long the block takes as a stage."""

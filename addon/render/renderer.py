@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -18,7 +19,18 @@ from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from .device_image import DeviceImage
 from .image_memory import ImageMemory
-from .method import Attribute, DeviceMethod, DeviceSurface, Method, MethodInfo, ProgressiveMethod, Request, Surface, timed
+from .method import (
+    Attribute,
+    DeviceMethod,
+    DeviceSurface,
+    Method,
+    MethodInfo,
+    PreparingMethod,
+    ProgressiveMethod,
+    Request,
+    Surface,
+    timed,
+)
 from .pass_images import NEEDED, PassImages, needed_attributes
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .surroundings import Backdrop, Motion
@@ -146,6 +158,17 @@ def render_to_show(
     if can_stay and isinstance(runner, DeviceMethod) and runner.shares_textures:
         return shot.device_image(runner.find_surface_on_device(shot.request))
     return shot.image(runner.find_surface(shot.request))
+
+
+def prepare(balls: Balls, field: Field, method: str, backend: str, threads: int = 0) -> None:
+    """Have the method begin to make what images of these balls will need, if it can, and return at once.
+
+    The parameters are those of :func:`render`. Nothing happens where the method cannot run: rendering tells why.
+    """
+    with suppress(MeniscusError):
+        runner = _pick_method(method, backend, frozenset()).runner
+        if isinstance(runner, PreparingMethod):
+            runner.prepare(balls, field, threads)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import statistics
 from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import meniscus
@@ -91,7 +92,7 @@ def measured(name: str, size: tuple[int, int], repeats: int, studies: tuple[str,
         spent = []
         for _ in range(repeats + 1):
             surface.milliseconds.clear()
-            context.run(lambda: stage.trace(surface, camera, fluid, lighting, tracing) and None)
+            context.run(partial(stage.trace, surface, camera, fluid, lighting, tracing))
             spent.append(surface.milliseconds["trace"])
         yield Row(name, memory, study, size, median(spent), hits * max(tracing.occlusion_rays, 1))
 

@@ -11,6 +11,7 @@ from scenes import SCENES, Scene
 
 import meniscus
 from meniscus.addon.fluid.errors import CancelledError, DeviceError
+from meniscus.addon.render import renderer
 from meniscus.addon.render.fitted_bvh import FittedBvh
 from meniscus.gpu_shaders.methods.fitted_bvh import method
 from meniscus.gpu_shaders.tree_constants import GREATEST_DEPTH
@@ -175,3 +176,14 @@ def test_all_balls_at_one_point(use, with_storage):
     scene = Scene(balls)
     camera = replace(scene.camera("perspective"), width=48, height=36)
     judge(image_of(scene, camera), scene, camera)
+
+
+def test_the_tree_of_the_next_frame_is_made_ready(use):
+    """What was begun beforehand is used, and not built again."""
+    made = use()
+    scene, asked = SCENES["random_5000"](), []
+    begin = made._builder._build
+    made._builder._build = lambda order, threads: (asked.append(order.balls), begin(order, threads))
+    renderer.prepare(scene.balls, scene.field, "fitted_bvh", "auto")
+    judge(image_of(scene, scene.camera("perspective")), scene, scene.camera("perspective"))
+    assert [balls is scene.balls for balls in asked] == [True]

@@ -319,3 +319,22 @@ class TestPace:
         pace.note(756_000, 0.01)
         assert pace.size(1080, 700, 1 / 24) == (1080, 700)
         assert Pace().size(1, 1, 1 / 24) == (1, 1)
+
+
+def test_what_the_next_balls_need_is_begun_while_the_last_are_drawn(fake):
+    asked = []
+    renderer = LiveRenderer(fake, prepare=lambda *arguments: asked.append(arguments))
+    try:
+        live = renderer.open()
+        live.show(VIEW)
+        rest(live)
+        assert asked == [], "nothing may be loaded while Blender draws"
+        fake.hold()
+        live.show(moved(VIEW, 1.0))
+        assert fake.begun.wait(SOON)
+        balls = meniscus.Balls([[0, 0, 1]], 0.9)
+        live.show(replace(VIEW, balls=balls, method="fitted_bvh"))
+        assert asked == [(balls, VIEW.field, "fitted_bvh", "auto", 0)], "the thread is still busy"
+    finally:
+        fake.going.set()
+        renderer.close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -12,8 +12,8 @@ from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.errors import MeniscusError
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import KERNELS
-from ....addon.render.fitted_bvh import FittedBvh, TreeArrays
 from ....addon.render.method import Attribute, Request, Surface, timed
+from ....addon.render.tree_builder import BuiltTree, TreeBuilder
 from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
 from ...context import GpuContext, shared_context
@@ -32,18 +32,6 @@ _GL_TRIANGLES = 4
 _PIXELS_A_PART = 1 << 23
 _IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
 """Binding points."""
-
-
-@dataclass(frozen=True)
-class _Grown:
-    """A tree over balls."""
-
-    balls: Balls
-    field: Field
-    arrays: TreeArrays
-
-    def is_of(self, request: Request) -> bool:
-        return self.balls is request.balls and self.field == request.field
 
 
 class FittedBvhMethod:
@@ -65,7 +53,8 @@ class FittedBvhMethod:
         self._hierarchy = hierarchy
         self._with_storage = uses_storage(context) if with_storage is None else with_storage
         self._steps: dict[Variant, Step | ComputeStep] = {}
-        self._tree: _Grown | None = None
+        self._builder = TreeBuilder(hierarchy)
+        self._tree: BuiltTree | None = None
         self._buffers: TreeBuffers | None = None
         # A driver that rejects the shaders is to be known before the method is chosen.
         context.run(lambda: self._step_of(Variant(KERNELS["wyvill"], TreeVariant(self._with_storage))))
@@ -79,6 +68,11 @@ class FittedBvhMethod:
     def shares_textures(self) -> bool:
         """See :meth:`method.DeviceMethod.shares_textures`."""
         return self._context.shares
+
+    def prepare(self, balls: Balls, field: Field, threads: int) -> None:
+        """See :meth:`method.PreparingMethod.prepare`."""
+        if len(balls):
+            self._builder.expect(balls, field, threads)
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""
@@ -110,20 +104,18 @@ class FittedBvhMethod:
             return self._context.run(work)
         except MeniscusError:
             self._tree, self._buffers = None, None
+            self._builder.forget()
             raise
 
-    def _tree_of(self, request: Request, milliseconds: dict[str, float]) -> _Grown:
-        """The tree over the balls, which stays while the same balls are asked for."""
-        if self._tree is None or not self._tree.is_of(request):
-            with timed(milliseconds, "build"):
-                tree = FittedBvh(
-                    request.balls, request.field, hierarchy=self._hierarchy, threads=request.threads, watch=request.watch
-                )
-                self._tree = _Grown(request.balls, request.field, tree.arrays())
-            self._buffers = None
-        return self._tree
+    def _tree_of(self, request: Request, milliseconds: dict[str, float]) -> BuiltTree:
+        """The tree over the balls, which stays while the same balls are asked for; the time that it took where it is new."""
+        tree = self._builder.tree(request.balls, request.field, request.threads, request.watch)
+        if tree is not self._tree:
+            milliseconds["build"] = tree.seconds * 1e3
+            self._tree, self._buffers = tree, None
+        return tree
 
-    def _find_part(self, request: Request, tree: _Grown, region: Region, surface: Surface) -> None:
+    def _find_part(self, request: Request, tree: BuiltTree, region: Region, surface: Surface) -> None:
         """Fill a part of `surface`; on the context's thread."""
         camera = replace(request.camera, region=region).cropped()
         textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
@@ -134,7 +126,7 @@ class FittedBvhMethod:
         for times, more in ((surface.milliseconds, textures.milliseconds), (surface.counts, textures.counts)):
             times |= {name: times.get(name, 0) + number for name, number in more.items()}
 
-    def _find_on_device(self, request: Request, tree: _Grown | None) -> SurfaceTextures:
+    def _find_on_device(self, request: Request, tree: BuiltTree | None) -> SurfaceTextures:
         """On the context's thread."""
         camera = request.camera
         textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
@@ -146,7 +138,7 @@ class FittedBvhMethod:
         self._context.gl.finish()
         return textures
 
-    def _find(self, request: Request, tree: _Grown, camera: Camera, textures: SurfaceTextures) -> None:
+    def _find(self, request: Request, tree: BuiltTree, camera: Camera, textures: SurfaceTextures) -> None:
         """Fill the textures."""
         times = StageTimes(self._context)
         with times.of("upload"):
@@ -157,7 +149,7 @@ class FittedBvhMethod:
             _cast(step, buffers, textures)
         textures.add_report(times.milliseconds, {})
 
-    def _uploaded(self, tree: _Grown, attributes: frozenset[Attribute]) -> TreeBuffers:
+    def _uploaded(self, tree: BuiltTree, attributes: frozenset[Attribute]) -> TreeBuffers:
         if self._buffers is None or not self._buffers.has(attributes):
             self._buffers = None  # its memory may be needed
             overlaps = self._hierarchy == "overlapping"

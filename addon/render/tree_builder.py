@@ -1,0 +1,149 @@
+"""Trees for a sequence of frames: the next one is built while the one before is drawn (Gourmel et al. 2010, figure 7)."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as StillBuilding
+from contextlib import suppress
+from dataclasses import dataclass
+from threading import Event, Lock
+
+from ..fluid.balls import Balls
+from ..fluid.errors import CancelledError, MeniscusError
+from ..fluid.field import Field
+from .fitted_bvh import FittedBvh, TreeArrays
+
+_LOOKS_A_SECOND = 50
+"""How often one who waits looks whether the user gave up."""
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltTree:
+    """A tree over balls, as a GPU takes it.
+
+    Attributes
+    ----------
+    balls, field
+        What it is made of.
+    arrays
+        The tree.
+    seconds
+        How long it took to build.
+    """
+
+    balls: Balls
+    field: Field
+    arrays: TreeArrays
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Order:
+    """A tree that is being built."""
+
+    balls: Balls
+    field: Field
+    is_awaited: Event = dataclasses.field(default_factory=Event)
+    is_given_up: Event = dataclasses.field(default_factory=Event)
+    tree: Future[BuiltTree] = dataclasses.field(default_factory=Future)
+
+    def is_of(self, balls: Balls, fluid_field: Field) -> bool:
+        return self.balls is balls and self.field == fluid_field
+
+
+class TreeBuilder:
+    """Builds trees on a thread of its own, one at a time, and keeps the last; its methods may be called from any thread.
+
+    Parameters
+    ----------
+    hierarchy
+        The kind of tree, see :class:`fitted_bvh.FittedBvh`.
+    """
+
+    def __init__(self, hierarchy: str = "fitted") -> None:
+        self._hierarchy = hierarchy
+        self._lock = Lock()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="meniscus-tree")
+        self._order: _Order | None = None
+
+    def expect(self, balls: Balls, fluid_field: Field, threads: int = 0) -> None:
+        """Begin to build a tree; one of other balls that nobody waits for is given up.
+
+        Parameters
+        ----------
+        balls, fluid_field
+            What it is to be made of.
+        threads
+            That work on it, 0 for one a core.
+        """
+        self._ordered(balls, fluid_field, threads)
+
+    def tree(self, balls: Balls, fluid_field: Field, threads: int, watch: Callable[[float], None]) -> BuiltTree:
+        """The tree over these balls: at once where it was built before, else when it is ready.
+
+        Parameters
+        ----------
+        balls, fluid_field, threads
+            As for :meth:`expect`.
+        watch
+            Is called now and then while it waits; what it raises is passed on.
+
+        Raises
+        ------
+        MeniscusError
+            It cannot be built.
+        """
+        order = self._ordered(balls, fluid_field, threads, is_awaited=True)
+        try:
+            while True:
+                watch(0.0)
+                with suppress(StillBuilding):
+                    return order.tree.result(1 / _LOOKS_A_SECOND)
+        except MeniscusError:
+            self._leave(order)
+            raise
+
+    def forget(self) -> None:
+        """Give back the memory of the tree that is kept."""
+        with self._lock:
+            self._order = None
+
+    def _ordered(self, balls: Balls, fluid_field: Field, threads: int, is_awaited: bool = False) -> _Order:
+        """What is being built, or was, of these balls; it is begun where there is none."""
+        with self._lock:
+            order = self._order
+            if order is None or not order.is_of(balls, fluid_field) or _has_failed(order):
+                if order is not None and not order.is_awaited.is_set():
+                    order.is_given_up.set()
+                order = self._order = _Order(balls, fluid_field)
+                self._thread.submit(self._build, order, threads)
+            if is_awaited:
+                order.is_awaited.set()
+            return order
+
+    def _leave(self, order: _Order) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            order.is_awaited.clear()
+            if order is not self._order:
+                order.is_given_up.set()
+
+    def _build(self, order: _Order, threads: int) -> None:
+        def watch(_: float) -> None:
+            if order.is_given_up.is_set():
+                raise CancelledError("Newer balls are to be shown")
+
+        start = time.perf_counter()
+        try:
+            watch(0.0)
+            tree = FittedBvh(order.balls, order.field, hierarchy=self._hierarchy, threads=threads, watch=watch)
+            order.tree.set_result(BuiltTree(order.balls, order.field, tree.arrays(), time.perf_counter() - start))
+        except BaseException as error:  # noqa: BLE001 - whoever waits for the tree gets it
+            order.tree.set_exception(error)
+
+
+def _has_failed(order: _Order) -> bool:
+    return order.tree.done() and order.tree.exception() is not None
