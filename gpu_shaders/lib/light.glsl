@@ -197,14 +197,27 @@ struct Met {
     float entering;
 };
 
-// Given the cosine of the angle to the facets; Fresnel's formulas for unpolarised light, and Schlick's curve for metal.
-Met light_meet(Material material, float cosine) {
+// Given the cosine of the angle to the facets; Fresnel's formulas for unpolarised light, and Schlick's curve for metal. Of what they
+// reflect a share is `shown`; the rest is hidden by others, which metal reflects once more, on average over all angles.
+Met light_meet(Material material, float cosine, float shown) {
     float x = clamp(cosine, 1e-3, 1.0), eta = material.ior;
     float y = sqrt(max(1.0 - (1.0 - x * x) / (eta * eta), 0.0));
     float across = (x - eta * y) / (x + eta * y), along = (eta * x - y) / (eta * x + y);
     float dielectric = 0.5 * (across * across + along * along);
-    vec3 metal = material.color + (1.0 - material.color) * pow(1.0 - x, 5.0);
+    vec3 again = material.color + (1.0 - material.color) / 21.0;
+    vec3 metal = (material.color + (1.0 - material.color) * pow(1.0 - x, 5.0)) * mix(again, vec3(1.0), shown);
     return Met(dielectric + material.metallic * (metal - dielectric), (1.0 - material.metallic) * (1.0 - dielectric));
+}
+
+// The share of what a facet mirrors that others do not hide, given the cosines of the angles of both directions to the normal
+// (Smith; Heitz 2014).
+float light_shown(float alpha, float to_eye, float mirrored) {
+    if (mirrored <= 0.0)
+        return 0.0;
+    vec2 cosines = clamp(vec2(to_eye, mirrored), 1e-3, 1.0);
+    vec2 squares = cosines * cosines;
+    vec2 hidden = 0.5 * (sqrt(1.0 + alpha * alpha * (1.0 - squares) / squares) - 1.0);
+    return (1.0 + hidden.x) / (1.0 + hidden.x + hidden.y);
 }
 
 // What of a light's irradiance facets send to the eye: Trowbridge and Reitz's distribution (GGX), with the usual approximation of
@@ -217,14 +230,14 @@ float light_facets(float roughness, float cosine, float near, float facing) {
     return min(squared / (4.0 * PI * spread * spread * near * near * (alpha + 0.5)) * facing, 16.0);
 }
 
-// The share of a light's irradiance that is sent to the eye, by facets only where `with_gloss`.
-vec3 light_sent(Material material, vec3 normal, vec3 to_eye, vec3 toward, bool with_gloss) {
+// The share of a light's irradiance that is sent to the eye: of what is `matt` as it is seen through the surface, and by facets
+// where `with_gloss`.
+vec3 light_sent(Material material, vec3 matt, vec3 normal, vec3 to_eye, vec3 toward, bool with_gloss) {
     float facing = max(dot(normal, toward), 0.0);
     vec3 between = normalize(to_eye + toward);
     float near = dot(toward, between);
-    Met met_light = light_meet(material, near);
-    vec3 sent = material.color * (1.0 - material.transmission) * (met_light.entering * facing / PI);
+    vec3 sent = matt * (facing / PI);
     if (with_gloss)
-        sent += met_light.reflected * light_facets(material.roughness, dot(normal, between), near, facing);
+        sent += light_meet(material, near, 1.0).reflected * light_facets(material.roughness, dot(normal, between), near, facing);
     return sent;
 }

@@ -189,7 +189,7 @@ vec3 trace_arriving(Vertex vertex, vec3 direction, float way, bool may_pass) {
             return vec3(0.0);
         Vertex met_vertex = trace_vertex(segment, hit, medium);
         Material material = met_vertex.material;
-        Met surface = light_meet(material, -dot(met_vertex.normal, direction));
+        Met surface = light_meet(material, -dot(met_vertex.normal, direction), 1.0);
         share *= trace_absorbed(medium, hit.t) * sqrt(max(material.color, 0.0)) * (surface.entering * material.transmission);
         if (share.x + share.y + share.z <= 0.0)
             return vec3(0.0);
@@ -205,8 +205,9 @@ vec3 trace_arriving(Vertex vertex, vec3 direction, float way, bool may_pass) {
 #endif
 }
 
-// Adds what lights, and the world by what is matt, let a vertex send.
-void trace_gather(Vertex vertex, Flight flight, vec3 ambient, uint number) {
+// Adds what lights and the world let a vertex send, of which what is `matt` is seen through its surface.
+void trace_gather(Vertex vertex, Flight flight, vec3 matt, uint number) {
+    vec3 ambient = flight.light * matt;
     vec3 to_eye = -flight.direction;
     int bounces = min(flight.reflections + flight.refractions, 8);
     // What is seen in mirrors may be noisier.
@@ -223,8 +224,9 @@ void trace_gather(Vertex vertex, Flight flight, vec3 ambient, uint number) {
             Shine shine = light_shine(light, vertex.position, random_square(random_branch(flight.seed, LIGHTS + i), number));
             // From within the light is not where a straight line says; and facets see lights that are wider than what they gather.
             bool is_gathered = vertex.is_within || light_extent(light, vertex.position) > light_alpha(vertex.material.roughness);
+            vec3 sent = light_sent(vertex.material, matt, vertex.normal, to_eye, shine.toward, !is_gathered);
             if (dot(shine.toward, vertex.normal) > 0.0)
-                brings = flight.light * shine.irradiance * light_sent(vertex.material, vertex.normal, to_eye, shine.toward, !is_gathered);
+                brings = flight.light * shine.irradiance * sent;
             direction = shine.toward;
             way = shine.distance;
             is_asked = has_shadows && light.casts_shadow && any(greaterThan(brings, vec3(0.0)));
@@ -290,16 +292,18 @@ void trace_split(Vertex vertex, Flight flight, vec3 facet, vec3 mirrored, vec3 p
 void trace_shade(Vertex vertex, Flight flight, uint number) {
     Material material = vertex.material;
     vec3 facet = vertex.normal;
+    float shown = 1.0;
     if (material.roughness > 0.0) {
         vec3 local = random_into(vertex.normal, -flight.direction);
         vec2 point = random_square(random_branch(flight.seed, FACET), number);
         vec3 seen = normalize(vec3(local.xy, max(local.z, 1e-6)));
         facet = random_along(vertex.normal, random_facet(seen, light_alpha(material.roughness), point));
+        vec3 mirrored = reflect(flight.direction, facet);
+        shown = light_shown(light_alpha(material.roughness), local.z, dot(mirrored, vertex.normal));
     }
-    Met surface = light_meet(material, -dot(facet, flight.direction));
+    Met surface = light_meet(material, -dot(facet, flight.direction), shown);
     radiance += flight.light * material.emission;
-    vec3 ambient = flight.light * material.color * ((1.0 - material.transmission) * surface.entering);
-    trace_gather(vertex, flight, ambient, number);
+    trace_gather(vertex, flight, material.color * ((1.0 - material.transmission) * surface.entering), number);
     vec3 passing = sqrt(max(material.color, 0.0)) * (surface.entering * material.transmission);
     trace_split(vertex, flight, facet, flight.light * surface.reflected, flight.light * passing, number);
 }
