@@ -15,7 +15,7 @@ class Tracing:
     ----------
     reflections
         How many mirrors light may meet on its way to the eye, 0 to 64; inner ones count. After the last one, surfaces mirror
-        the world alone.
+        the world and the lights, as if nothing were in the way.
     refractions
         How many times it may enter or leave a body that lets light pass, 0 to 64; a drop of water takes two. After the
         last one the world is seen.

@@ -27,7 +27,6 @@ AREA = {
 # The material, the lights, and whether the world is an image.
 CASES = {
     "tinted glass": ({"color": GOLD, "transmission": 1.0, "roughness": 0.0, "ior": 1.33}, [POINT], True),
-    "frosted glass": ({"transmission": 1.0, "roughness": 0.2, "ior": 1.45}, [], True),
     "mirror": ({"color": GOLD, "metallic": 1.0, "roughness": 0.0}, [AREA], True),
     "rough metal": ({"color": GOLD, "metallic": 1.0, "roughness": 0.5}, [], True),
     "matt": ({"color": GOLD, "roughness": 1.0, "ior": 1.0}, [POINT, AREA, SUN, SPOT], True),

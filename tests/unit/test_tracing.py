@@ -267,12 +267,13 @@ def test_lights_of_a_size_light_as_their_whole_does():
         assert image[..., 0] == pytest.approx(expected, rel=0.01), light
 
 
-def test_a_mirror_shows_lights_of_a_size():
+@pytest.mark.parametrize("reflections", [0, 1])
+def test_a_mirror_shows_lights_of_a_size(reflections):
     sun = Light("SUN", (0.3, 0.2, 0.1), direction=(0.0, 1.0, 0.0), radius=0.4)
     lamp = Light("AREA", (5.0, 5.0, 5.0), (0.0, -3.0, 1.5), (0.0, 1.0, 0.0), size=(2.0, 0.8))
     _, normals = sphere_hits(CAMERA)
     points, _ = sphere_hits(CAMERA)
-    image, hit = render(BALL, MIRROR, Lighting((sun, lamp)))
+    image, hit = render(BALL, MIRROR, Lighting((sun, lamp)), Tracing(reflections=reflections))
     directions = mirrored(rays(CAMERA)[1], normals)[hit]
     angle = np.arccos(np.clip(-directions[:, 1], -1, 1))
     shows_sun = (angle < 0.4)[:, None] * np.array([0.3, 0.2, 0.1]) / (math.pi * math.sin(0.4) ** 2)

@@ -446,16 +446,19 @@ impl<'a, S: Simd> Tracer<'a, S> {
         }
     }
 
-    /// A ray for the light from a direction; the last of a path sees the world at once.
+    /// A ray for the light from a direction; the last of a path sees lights and world at once.
     fn gather(&mut self, vertex: &Vertex, direction: [f64; 3], light: [f32; 3], path: Path, is_last: bool, passes: bool) {
-        if is_last || is_dim(light) {
-            return self.escape(&path, light, direction);
-        }
         let ray = vertex.leaving(direction, f64::INFINITY, passes);
         let medium = if passes { vertex.beyond() } else { vertex.flight.medium };
         let roughness = self.scene.materials[vertex.arrival.material as usize].roughness;
         let lobe = if passes || vertex.is_within { 0.0 } else { alpha(roughness) };
-        self.next.push(Flight { ray, light, path, medium, purpose: Purpose::Gather { lobe } });
+        let flight = Flight { ray, light, path, medium, purpose: Purpose::Gather { lobe } };
+        if is_last || is_dim(light) {
+            self.see_lights(&flight, lobe, f64::INFINITY);
+            self.escape(&path, light, direction);
+        } else {
+            self.next.push(flight);
+        }
     }
 
     /// Answers what was asked.
