@@ -21,7 +21,7 @@ from .shading import Ranges, SurfacePoints, directions_to_eye, shaded, view_norm
 from .spans import find_spans
 from .surroundings import Backdrop, Color, Motion
 from .thickness import at_pixels, thickness_image
-from .tracing import SeenSurface, TracedScene, trace_image
+from .tracing import SeenSurface, TracedScene, Tracer, trace_image
 
 FloatArray = npt.NDArray[np.float32]
 BoolArray = npt.NDArray[np.bool_]
@@ -80,8 +80,9 @@ class PassImages:
         motion: Motion | None,
         names: tuple[str, ...],
         sample: int = 0,
+        trace: Tracer = trace_image,
     ) -> None:
-        self._names, self._sample = names, sample
+        self._names, self._sample, self._trace_image = names, sample, trace
         self._surface, self._request, self._whole_camera, self._look = surface, request, camera, look
         self._behind = backdrop
         # Where no object is behind, the fluid's passes are whole as they are.
@@ -318,7 +319,7 @@ class PassImages:
             others = self.hit & ~self._fluid
             material = np.where(others, backdrop.material + np.int32(len(materials)), material)
             color = np.where(self._fluid[..., None], color, backdrop.color)
-        trace_image(
+        self._trace_image(
             rgba,
             SeenSurface(self._depth, self._normal, color, material, ball),
             request.camera,

@@ -98,6 +98,12 @@ def gpu() -> ModuleType:
         raise DeviceError(f"OpenGL cannot be used because a package is missing ({error}); reinstall the extension") from error
 
 
+def tracing_stage() -> ModuleType:
+    """The module that traces light on the graphics processor; raises DeviceError where packages are missing."""
+    gpu()
+    return importlib.import_module(f"{_PACKAGE}.gpu_shaders.tracing.images")
+
+
 def runs_in_software_opengl(info: MethodInfo) -> bool:
     """Whether the method would run through an OpenGL that is itself only software; DeviceError where there is none."""
     return info.backend == "gpu" and bool(gpu().shared_context().is_software)

@@ -18,6 +18,7 @@ from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.look import Look
 from ..fluid.passes import PASSES, checked_passes
 from .device_image import DeviceImage
+from .device_tracing import trace_image_on_device
 from .image_memory import ImageMemory
 from .method import (
     Attribute,
@@ -34,6 +35,7 @@ from .method import (
 from .pass_images import NEEDED, PassImages, needed_attributes
 from .registry import create_method, method_infos, runs_in_software_opengl
 from .surroundings import Backdrop, Motion
+from .tracing import Tracer, trace_image
 
 Element = TypeVar("Element", np.float32, np.bool_, np.int32)
 
@@ -232,9 +234,8 @@ class _Shot:
         """The passes of what the method has found."""
         report = self._report(surface)
         with timed(report.milliseconds, "passes"):
-            made = PassImages(
-                surface, self.request, self.camera, self.look, self.backdrop, self.motion, self.passes, self.sample
-            )
+            given = self.request, self.camera, self.look, self.backdrop, self.motion, self.passes, self.sample
+            made = PassImages(surface, *given, self.choice.tracer)
             images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
             objects = _in_whole_image(made.objects, self.camera, -1) if "object_index" in self.passes else None
             return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)
@@ -247,6 +248,12 @@ class _Choice:
     info: MethodInfo
     runner: Method
     reason: str
+
+    @property
+    def tracer(self) -> Tracer:
+        """What traces light: the graphics processor where the method runs on one, else the native core."""
+        is_hardware = self.info.backend == "gpu" and not runs_in_software_opengl(self.info)
+        return trace_image_on_device if is_hardware else trace_image
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:

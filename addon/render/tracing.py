@@ -24,6 +24,8 @@ from .vector_math import FloatArray
 
 IntArray = npt.NDArray[np.int32]
 Watch = Callable[[float], None]
+Tracer = Callable[..., None]
+"""With the parameters of :func:`trace_image`."""
 
 _UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -79,7 +79,7 @@ class TracedLight:
         lighting: Lighting,
         tracing: Tracing,
         irradiance: npt.NDArray[np.float32] | None = None,
-        image: int = 0,
+        first_sample: int = 0,
         is_film_clear: bool = False,
     ) -> moderngl.Texture:
         """The light that a surface sends to the eye.
@@ -92,8 +92,8 @@ class TracedLight:
             What light meets, in world space, and how far it is followed.
         irradiance
             (h, w, 3) the irradiance over pi by normals, equirectangular, where the world has an image.
-        image
-            How many images of this view were made before: each has other samples.
+        first_sample
+            How many samples of this view were taken before: each is another one.
         is_film_clear
             Whether the world that is seen straight through surfaces is left out, and makes the image transparent.
 
@@ -107,14 +107,19 @@ class TracedLight:
         lets_pass = any(material.transmission > 0 and material.metallic < 1 for material in materials)
         with_image = lighting.image is not None and irradiance is not None
         variant = Variant(
-            fluid.field.density_kernel, buffers.variant, balls.colors is not None, len(materials) > 1, lets_pass, with_image
+            fluid.field.density_kernel,
+            buffers.variant,
+            balls.colors is not None,
+            balls.sources is not None,
+            lets_pass,
+            with_image,
         )
         step = self._step_of(variant)
         step.set_uniforms(
             {
                 **buffers.uniforms,
                 **tree_camera_uniforms(fluid.tree, camera, fluid.field),
-                **_uniforms(fluid, lighting, tracing, image, is_film_clear),
+                **_uniforms(fluid, lighting, tracing, first_sample, is_film_clear),
             }
         )
         texels = scene_texels(materials, lighting, fluid.tree.origin)
@@ -228,7 +233,9 @@ def _light_numbers(light: Light, origin: npt.NDArray[np.float64]) -> list[float]
     ]
 
 
-def _uniforms(fluid: TracedFluid, lighting: Lighting, tracing: Tracing, image: int, is_film_clear: bool) -> dict[str, object]:
+def _uniforms(
+    fluid: TracedFluid, lighting: Lighting, tracing: Tracing, first_sample: int, is_film_clear: bool
+) -> dict[str, object]:
     radii = fluid.balls.radii
     uniforms: dict[str, object] = {
         "material_count": len(fluid.materials),
@@ -242,7 +249,7 @@ def _uniforms(fluid: TracedFluid, lighting: Lighting, tracing: Tracing, image: i
         "has_shadows": tracing.shadows,
         "is_film_clear": is_film_clear,
         "sample_count": tracing.samples,
-        "first_sample": image * tracing.samples & 0xFFFFFFFF,
+        "first_sample": first_sample & 0xFFFFFFFF,
     }
     if lighting.image is not None:
         turn = np.array(lighting.image.image_from_world, np.float64)

@@ -11,11 +11,12 @@ from scenes import SCENES, Scene
 import meniscus
 from meniscus.addon.fluid.lighting import Light, Lighting, Material, WorldImage
 from meniscus.addon.fluid.tracing import Tracing
-from meniscus.addon.render import native
+from meniscus.addon.render import native, renderer
 from meniscus.addon.render.fitted_bvh import FittedBvh
 from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method, method_infos
 from meniscus.addon.render.tracing import SeenSurface, TracedScene, trace_image
+from meniscus.gpu_shaders.tracing import images
 from meniscus.gpu_shaders.tracing.stage import TracedFluid, TracedLight
 
 MEMORIES = pytest.mark.parametrize("with_storage", [False, True], ids=["textures", "storage"])
@@ -58,7 +59,9 @@ class Traced:
         balls, image = self.scene.balls, self.lighting.image
         fluid = TracedFluid(FittedBvh(balls, self.scene.field).arrays(), balls, self.scene.field, self.materials)
         irradiance = None if image is None else native.load().WorldImage(image.pixels).irradiance()
-        texture = stage.trace(surface, camera, fluid, self.lighting, self.tracing, irradiance, 3, self.is_film_clear)
+        texture = stage.trace(
+            surface, camera, fluid, self.lighting, self.tracing, irradiance, 3 * self.tracing.samples, self.is_film_clear
+        )
         return np.frombuffer(texture.read(), np.float32).reshape(camera.height, camera.width, 4)
 
     def _on_cpu(self, passes, camera):
@@ -156,3 +159,54 @@ def test_mirrors_that_face_each_other_end_at_the_depth(opengl):
     scene = Scene(meniscus.Balls([[-0.65, 0, 0], [0.65, 0, 0]], 1.0))
     endless = Traced(scene, (replace(METAL, color=(1.0, 1.0, 1.0)),), SKY, Tracing(reflections=64))
     assert_same_picture(*endless.images(opengl), share=2e-2)
+
+
+def combined(scene, camera, look, method="fitted_bvh"):
+    return meniscus.render(scene.balls, camera, scene.field, method=method, passes=("combined",), look=look, sample=2)[
+        "combined"
+    ]
+
+
+@pytest.fixture
+def hardware(monkeypatch, opengl):
+    """Has OpenGL taken for hardware, so that light is traced there; gives how often that was."""
+    traced = []
+    trace = images.ImageTracer._trace
+    monkeypatch.setattr(renderer, "runs_in_software_opengl", lambda _: False)
+    monkeypatch.setattr(images.ImageTracer, "_trace", lambda *arguments: (traced.append(1), trace(*arguments))[1])
+    return traced
+
+
+@pytest.mark.parametrize("contrast", [0.0, 2.0])
+def test_combined_is_traced_where_the_method_runs(hardware, monkeypatch, contrast):
+    """In parts, each of a few samples."""
+    monkeypatch.setattr(images, "_RAYS_AT_ONCE", 3 * 96 * 72)
+    world = WorldImage(np.random.default_rng(3).random((8, 16, 3), np.float32))
+    look = meniscus.Look(
+        style="material",
+        color=(0.8, 0.5, 0.3),
+        lighting=Lighting((SUN,), world.mean, world),
+        tracing=Tracing(samples=7),
+        depth_contrast=contrast,
+    )
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera("perspective")
+    found, wanted = combined(scene, camera, look), combined(scene, camera, look, "tile_caster")
+    assert len(hardware) == 3
+    assert_same_picture(found, wanted, wanted[..., 3] > 0, share=5e-3)
+
+
+def test_no_balls_have_no_light(hardware):
+    scene = Scene(meniscus.Balls(np.zeros((0, 3)), 1.0))
+    look = meniscus.Look(style="material", lighting=SKY, tracing=Tracing())
+    assert not combined(scene, scene.camera("perspective"), look).any()
+    assert not hardware
+
+
+def test_one_ball_without_any_light_is_black(hardware):
+    scene = SCENES["one_ball"]()
+    picture = combined(
+        scene, scene.camera("perspective"), meniscus.Look(style="material", lighting=Lighting(), tracing=Tracing())
+    )
+    assert picture[..., 3].any()
+    assert not picture[..., :3].any()
