@@ -244,17 +244,18 @@ void trace_gather(Vertex vertex, Flight flight, vec3 matt, uint number) {
     radiance += ambient * max(light_on_normal(vertex.normal) - hidden / float(max(ray_count, 1u)), 0.0);
 }
 
-// Sends a ray for the light from a direction; the last of a path sees the world at once.
+// Sends a ray for the light from a direction; the last of a path sees lights and world at once.
 void trace_send(Vertex vertex, Flight flight, bool is_last, bool passes) {
-    if (is_last || all(lessThan(flight.light, vec3(DIM)))) {
-        trace_escape(flight);
-        return;
-    }
     flight.origin = vertex_leaving(vertex, passes);
     flight.is_inside = vertex.is_within != passes;
     flight.medium = passes ? vertex_beyond(vertex) : vertex.medium;
     flight.lobe = passes || vertex.is_within ? 0.0 : light_alpha(vertex.material.roughness);
-    trace_push(flight);
+    if (is_last || all(lessThan(flight.light, vec3(DIM)))) {
+        trace_see_lights(flight, ENDLESS);
+        trace_escape(flight);
+    } else {
+        trace_push(flight);
+    }
 }
 
 // Sends rays for what a vertex reflects and lets pass.
