@@ -51,3 +51,9 @@ class Step:
         self.use_textures(textures)
         framebuffer.use()
         self._array.render(mode, vertices)
+
+    def draw_plainly(self, framebuffer: moderngl.Framebuffer, textures: Mapping[str, Texture]) -> None:
+        """Draw every pixel of a framebuffer once, whatever others have left switched on."""
+        self._gl.enable_only(moderngl.NOTHING)
+        framebuffer.viewport = (0, 0, *framebuffer.size)
+        self.draw(framebuffer, moderngl.TRIANGLES, 3, textures)

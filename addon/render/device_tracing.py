@@ -12,10 +12,8 @@ from ..fluid.tracing import Tracing
 from . import native
 from .registry import tracing_stage
 from .tracing import SeenSurface, TracedScene, Watch, trace_image
-from .tree_builder import TreeBuilder
+from .tree_builder import TREES
 from .vector_math import FloatArray
-
-_TREES = TreeBuilder()
 
 
 def trace_image_on_device(
@@ -38,7 +36,7 @@ def trace_image_on_device(
         trace_image(rgba, seen, camera, scene, tracing, contrast, image, is_film_clear, threads, watch)
         return
     stage = tracing_stage()
-    tree = _TREES.tree(scene.balls, scene.field, threads, watch)
+    tree = TREES.tree(scene.balls, scene.field, threads, watch)
     fluid = stage.TracedFluid(tree.arrays, scene.balls, scene.field, scene.materials)
     lighting = scene.lighting
     irradiance = None if lighting.image is None else _irradiance(lighting.image)

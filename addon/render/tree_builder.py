@@ -147,3 +147,7 @@ class TreeBuilder:
 
 def _has_failed(order: _Order) -> bool:
     return order.tree.done() and order.tree.exception() is not None
+
+
+TREES = TreeBuilder()
+"""Builds the fitted trees of whatever wants any, so that it is one for the surface and for its light."""

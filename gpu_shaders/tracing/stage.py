@@ -28,7 +28,6 @@ from .programs import Variant
 
 _KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}
 _SCENE_BINDING, _SOURCES_BINDING = 6, 7
-_GL_TRIANGLES = 4
 
 _MOST_DISTANCE = 3e38
 """Stands for no end in shaders."""
@@ -172,7 +171,7 @@ class TracedLight:
         }
         if isinstance(self._sources, BufferTexture):
             textures["sources_tx"] = self._sources
-        step.draw(self._context.gl.framebuffer([output]), _GL_TRIANGLES, 3, textures)
+        step.draw_plainly(self._context.gl.framebuffer([output]), textures)
 
     def _uploaded(self, fluid: TracedFluid) -> TreeBuffers:
         """The tree's buffers, which stay while the same tree is asked for."""

@@ -191,7 +191,7 @@ def lose_by_reset_status(context, monkeypatch):
     monkeypatch.setattr(context._driver, "_get_reset_status", lambda: INNOCENT_CONTEXT_RESET)
 
 
-@pytest.mark.parametrize("name", ["depth_peeling", "tile_lists"])
+@pytest.mark.parametrize("name", ["depth_peeling", "fitted_bvh", "tile_lists"])
 @pytest.mark.parametrize("lose", [lose_by_error, lose_by_reset_status])
 def test_a_lost_context_fails_the_render_and_the_next_one_has_a_new_context(another_context, monkeypatch, lose, name):
     expected = render(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 from judge import expected, judge
@@ -13,6 +14,7 @@ import meniscus
 from meniscus.addon.fluid.errors import CancelledError, DeviceError
 from meniscus.addon.render import renderer
 from meniscus.addon.render.fitted_bvh import FittedBvh
+from meniscus.addon.render.tree_builder import TREES
 from meniscus.gpu_shaders.methods.fitted_bvh import method
 from meniscus.gpu_shaders.tree_constants import GREATEST_DEPTH
 
@@ -178,12 +180,21 @@ def test_all_balls_at_one_point(use, with_storage):
     judge(image_of(scene, camera), scene, camera)
 
 
-def test_the_tree_of_the_next_frame_is_made_ready(use):
+def test_the_tree_of_the_next_frame_is_made_ready(monkeypatch):
     """What was begun beforehand is used, and not built again."""
-    made = use()
     scene, asked = SCENES["random_5000"](), []
-    begin = made._builder._build
-    made._builder._build = lambda order, threads: (asked.append(order.balls), begin(order, threads))
+    begin = TREES._build
+    monkeypatch.setattr(TREES, "_build", lambda order, threads: (asked.append(order.balls), begin(order, threads)))
     renderer.prepare(scene.balls, scene.field, "fitted_bvh", "auto")
     judge(image_of(scene, scene.camera("perspective")), scene, scene.camera("perspective"))
     assert [balls is scene.balls for balls in asked] == [True]
+
+
+@pytest.mark.parametrize("flags", [moderngl.BLEND, moderngl.DEPTH_TEST | moderngl.BLEND, moderngl.CULL_FACE])
+def test_what_others_have_left_switched_on_changes_nothing(opengl, use, flags):
+    use(with_storage=False)
+    scene = SCENES["ten_balls"]()
+    camera = scene.camera("perspective")
+    whole = image_of(scene, camera)
+    opengl.run(lambda: opengl.gl.enable_only(flags))
+    np.testing.assert_array_equal(image_of(scene, camera)["depth"], whole["depth"])

@@ -13,7 +13,7 @@ from ....addon.fluid.errors import MeniscusError
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import KERNELS
 from ....addon.render.method import Attribute, Request, Surface, timed
-from ....addon.render.tree_builder import BuiltTree, TreeBuilder
+from ....addon.render.tree_builder import TREES, BuiltTree, TreeBuilder
 from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
 from ...context import GpuContext, shared_context
@@ -28,7 +28,6 @@ from .programs import Variant
 
 Result = TypeVar("Result")
 
-_GL_TRIANGLES = 4
 _PIXELS_A_PART = 1 << 23
 _IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
 """Binding points."""
@@ -53,7 +52,7 @@ class FittedBvhMethod:
         self._hierarchy = hierarchy
         self._with_storage = uses_storage(context) if with_storage is None else with_storage
         self._steps: dict[Variant, Step | ComputeStep] = {}
-        self._builder = TreeBuilder(hierarchy)
+        self._builder = TREES if hierarchy == "fitted" else TreeBuilder(hierarchy)
         self._tree: BuiltTree | None = None
         self._buffers: TreeBuffers | None = None
         # A driver that rejects the shaders is to be known before the method is chosen.
@@ -179,5 +178,4 @@ def _cast(step: Step | ComputeStep, buffers: TreeBuffers, textures: SurfaceTextu
             texture.bind_to_image(_IMAGES[name], read=False, write=True)
         step.run(-(-width // 8), -(-height // 4))
     else:
-        textures.framebuffer.viewport = (0, 0, width, height)
-        step.draw(textures.framebuffer, _GL_TRIANGLES, 3, buffers.textures)
+        step.draw_plainly(textures.framebuffer, buffers.textures)
