@@ -30,7 +30,7 @@ _GREATEST_WEIGHT = 1e15
 """Of a ball in radii, as for the native core: the squares of the density's slopes must be floats."""
 
 _STORAGE_VERSION = 430
-_STORAGE_BLOCKS = 8
+_STORAGE_BLOCKS = 10
 """Those of a tree, and what the shaders that use it may have beside it."""
 
 

@@ -29,7 +29,7 @@ Tracer = Callable[..., None]
 
 _UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-_MOST_KEPT = 16
+_MOSTKEPT = 16
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def trace_image(
     """
     core = native.load()
     balls, lighting = scene.balls, scene.lighting
-    fluid = _KEPT.made(balls, scene.field, lambda: FittedBvh(balls, scene.field, threads=threads, watch=watch).native)
+    fluid = KEPT.made(balls, scene.field, lambda: FittedBvh(balls, scene.field, threads=threads, watch=watch).native)
     with native.translated_errors():
         core.trace_image(
             rgba,
@@ -158,15 +158,24 @@ def _mesh_arguments(core: Any, scene: TracedScene, threads: int, watch: Watch) -
     if meshes is None:
         none = np.empty((0, 3), np.int32)
         return core.Triangles(np.empty((0, 3), np.float32), none), np.empty((0, 9), np.float32), none[:, 0]
-    tree = _KEPT.made(meshes, None, lambda: core.Triangles(meshes.vertices, meshes.triangles, threads=threads, watch=watch))
-    return tree, meshes.normals.reshape(-1, 9), meshes.material + np.int32(len(scene.materials))
+    return (
+        triangle_tree(meshes, threads, watch),
+        meshes.normals.reshape(-1, 9),
+        meshes.material + np.int32(len(scene.materials)),
+    )
+
+
+def triangle_tree(meshes: Meshes, threads: int, watch: Watch) -> Any:
+    """The native core's tree over triangles, which is kept as long as these live."""
+    made = native.load().Triangles
+    return KEPT.made(meshes, None, lambda: made(meshes.vertices, meshes.triangles, threads=threads, watch=watch))
 
 
 def _world_arguments(core: Any, image: WorldImage | None) -> tuple[Any, Any]:
     """The image of the world, or None, and the rotation into its space."""
     if image is None:
         return None, _UPRIGHT
-    return _KEPT.made(image, None, lambda: core.WorldImage(np.ascontiguousarray(image.pixels))), image.image_from_world
+    return KEPT.made(image, None, lambda: core.WorldImage(np.ascontiguousarray(image.pixels))), image.image_from_world
 
 
 class _Kept:
@@ -186,7 +195,7 @@ class _Kept:
         made = make()
         with self._lock:
             living = {key: kept for key, kept in self._made.items() if kept[0]() is not None}
-            self._made = dict(list(living.items())[1 - _MOST_KEPT :])
+            self._made = dict(list(living.items())[1 - _MOSTKEPT :])
             self._made[key] = weakref.ref(owner, lambda _: self._forget(key)), made
         return made
 
@@ -195,4 +204,4 @@ class _Kept:
         self._made.pop(key, None)
 
 
-_KEPT = _Kept()
+KEPT = _Kept()

@@ -109,12 +109,15 @@ Segment segment_from(vec3 start, vec3 direction) {
 }
 
 // Rounding keeps the order of planes: the intervals of nested boxes are nested, and those of neighbours share their border.
-TreeNode tree_node(uint index, Segment segment, float begin, float end) {
-    uvec4 low = tree_words(2u * index), high = tree_words(2u * index + 1u);
+TreeNode tree_node_of(uvec4 low, uvec4 high, Segment segment, float begin, float end) {
     vec3 a = (uintBitsToFloat(low.xyz) - segment.start) * segment.inverse;
     vec3 b = (uintBitsToFloat(high.xyz) - segment.start) * segment.inverse;
     vec3 enter = min(a, b), exit = max(a, b);
     return TreeNode(max(max(enter.x, enter.y), max(enter.z, begin)), min(min(exit.x, exit.y), min(exit.z, end)), low.w, high.w);
+}
+
+TreeNode tree_node(uint index, Segment segment, float begin, float end) {
+    return tree_node_of(tree_words(2u * index), tree_words(2u * index + 1u), segment, begin, end);
 }
 
 // The box of an empty leaf is reversed, and would be everywhere.

@@ -1,10 +1,13 @@
 // Light followed back from the eye through the surface of a pixel: shadows, reflections, refraction, ambient occlusion. docs/light.md
 // has the formulas. A path is followed to its end before the next one; of both ways at a surface one waits.
-// LETS_PASS: whether any material lets light pass. WITH_SOURCES: whether balls differ in their materials. Rays begin on a known side
+// WITH_MESHES: whether there are any beside the fluid. LETS_PASS: whether any material lets light pass. WITH_SOURCES: whether balls differ in their materials. Rays begin on a known side
 // of the surface, so it is not asked.
 #include "lib/light.glsl"
 #include "lib/tree_camera.glsl"
 #include "lib/tree_surface.glsl"
+#if WITH_MESHES
+#include "lib/triangle_tree.glsl"
+#endif
 
 #if WITH_SOURCES
 #if WITH_STORAGE
@@ -69,9 +72,12 @@ struct Flight {
 // A point of a surface that is to be shaded.
 struct Vertex {
     vec3 position;
-    vec3 normal; // on the side of the ray
+    vec3 normal;    // for light, on the side of the ray
+    vec3 geometric; // that of the surface itself, on the same side
     float lift;
     bool is_within; // seen from within
+    bool is_inside; // before it is fluid, whatever it is itself
+    bool is_fluid;  // it is the fluid's surface
     int medium;     // before it
     int index;      // of its material
     Material material;
@@ -155,12 +161,69 @@ Vertex trace_vertex(Segment segment, TreeHit hit, int medium) {
     bool is_within = dot(surface.normal, segment.direction) > 0.0;
     if (is_within)
         material.ior = 1.0 / material.ior;
-    return Vertex(position, is_within ? -surface.normal : surface.normal, lift, is_within, medium, index, material);
+    vec3 normal = is_within ? -surface.normal : surface.normal;
+    return Vertex(position, normal, normal, lift, is_within, is_within, true, medium, index, material);
+}
+
+#if WITH_MESHES
+// A point of a mesh, seen along a ray.
+Vertex trace_mesh_vertex(Segment segment, TriangleHit hit, bool is_inside, int medium) {
+    vec3 first = triangle_texel(hit.entry, 3u).xyz, second = triangle_texel(hit.entry, 4u).xyz;
+    vec3 third = triangle_texel(hit.entry, 5u).xyz;
+    vec3 normal = normalize(first + hit.shares.x * (second - first) + hit.shares.y * (third - first));
+    vec3 geometric = dot(normal, hit.normal) < 0.0 ? -hit.normal : hit.normal;
+    bool is_within = dot(geometric, segment.direction) > 0.0;
+    int index = int(triangle_texel(hit.entry, 0u).w);
+    Material material = light_material(uint(index));
+    if (is_within)
+        material.ior = 1.0 / material.ior;
+    float side = is_within ? -1.0 : 1.0;
+    vec3 position = segment.start + hit.t * segment.direction;
+    float lift = 2.0 * trace_rounding(segment.start, position);
+    return Vertex(position, side * normal, side * geometric, lift, is_within, is_inside, false, medium, index, material);
+}
+#endif
+
+// What a ray meets first.
+struct SceneHit {
+    float t;
+    TreeHit fluid;
+    bool is_mesh;
+#if WITH_MESHES
+    TriangleHit mesh;
+#endif
+};
+
+// As tree_cast, of fluid and meshes.
+bool trace_cast(Segment segment, float begin, float end, bool asks, bool is_inside, bool takes_any, out SceneHit hit) {
+    bool has_met = tree_cast(segment, begin, end, asks, is_inside, takes_any, hit.fluid);
+    hit.t = has_met ? hit.fluid.t : end;
+    hit.is_mesh = false;
+#if WITH_MESHES
+    if (!(has_met && takes_any) && triangle_cast(segment, begin, hit.t, takes_any, hit.mesh)) {
+        hit.is_mesh = has_met = true;
+        hit.t = hit.mesh.t;
+    }
+#endif
+    return has_met;
+}
+
+Vertex trace_vertex_of(Segment segment, SceneHit hit, int medium) {
+#if WITH_MESHES
+    if (hit.is_mesh)
+        return trace_mesh_vertex(segment, hit.mesh, hit.fluid.is_inside, medium);
+#endif
+    return trace_vertex(segment, hit.fluid, medium);
 }
 
 // Where a ray from it begins, on the side it is seen from or on the other.
 vec3 vertex_leaving(Vertex vertex, bool passes) {
-    return vertex.position + (passes ? -vertex.lift : vertex.lift) * vertex.normal;
+    return vertex.position + (passes ? -vertex.lift : vertex.lift) * vertex.geometric;
+}
+
+// Whether it begins in the fluid.
+bool vertex_leaving_inside(Vertex vertex, bool passes) {
+    return vertex.is_inside != (passes && vertex.is_fluid);
 }
 
 // The material behind it.
@@ -177,31 +240,30 @@ vec3 trace_toward(vec3 direction, vec3 side) {
 // The share of a light, or of the world, that reaches a vertex along a ray.
 vec3 trace_arriving(Vertex vertex, vec3 direction, float way, bool may_pass) {
     Segment segment = segment_from(vertex_leaving(vertex, false), direction);
-    bool is_inside = vertex.is_within;
+    bool is_inside = vertex.is_inside;
+    SceneHit hit;
 #if LETS_PASS
     vec3 share = vec3(1.0);
     int medium = vertex.medium;
     for (int passed = 0; passed <= min(most_refractions, 64); passed++) {
-        TreeHit hit;
-        if (!tree_cast(segment, 0.0, way, false, is_inside, !may_pass, hit))
+        if (!trace_cast(segment, 0.0, way, false, is_inside, !may_pass, hit))
             return share * trace_absorbed(medium, way);
         if (!may_pass || passed == most_refractions)
             return vec3(0.0);
-        Vertex met_vertex = trace_vertex(segment, hit, medium);
+        Vertex met_vertex = trace_vertex_of(segment, hit, medium);
         Material material = met_vertex.material;
         Met surface = light_meet(material, -dot(met_vertex.normal, direction), 1.0);
         share *= trace_absorbed(medium, hit.t) * sqrt(max(material.color, 0.0)) * (surface.entering * material.transmission);
         if (share.x + share.y + share.z <= 0.0)
             return vec3(0.0);
         medium = vertex_beyond(met_vertex);
-        is_inside = !is_inside;
+        is_inside = vertex_leaving_inside(met_vertex, true);
         way = way >= ENDLESS ? way : way - hit.t;
         segment = segment_from(vertex_leaving(met_vertex, true), direction);
     }
     return vec3(0.0);
 #else
-    TreeHit hit;
-    return vec3(tree_cast(segment, 0.0, way, false, is_inside, true, hit) ? 0.0 : 1.0);
+    return vec3(trace_cast(segment, 0.0, way, false, is_inside, true, hit) ? 0.0 : 1.0);
 #endif
 }
 
@@ -247,7 +309,7 @@ void trace_gather(Vertex vertex, Flight flight, vec3 matt, uint number) {
 // Sends a ray for the light from a direction; the last of a path sees lights and world at once.
 void trace_send(Vertex vertex, Flight flight, bool is_last, bool passes) {
     flight.origin = vertex_leaving(vertex, passes);
-    flight.is_inside = vertex.is_within != passes;
+    flight.is_inside = vertex_leaving_inside(vertex, passes);
     flight.medium = passes ? vertex_beyond(vertex) : vertex.medium;
     flight.lobe = passes || vertex.is_within ? 0.0 : light_alpha(vertex.material.roughness);
     if (is_last || all(lessThan(flight.light, vec3(DIM)))) {
@@ -270,7 +332,7 @@ void trace_split(Vertex vertex, Flight flight, vec3 facet, vec3 mirrored, vec3 p
     float cosine = dot(flight.direction, facet);
     if (mirrored.x + mirrored.y + mirrored.z > 0.0) {
         Flight next = flight;
-        next.direction = trace_toward(flight.direction - 2.0 * cosine * facet, vertex.normal);
+        next.direction = trace_toward(flight.direction - 2.0 * cosine * facet, vertex.geometric);
         next.light = mirrored;
         next.seed = random_branch(flight.seed, REFLECTION);
         next.reflections = flight.reflections + 1;
@@ -281,7 +343,7 @@ void trace_split(Vertex vertex, Flight flight, vec3 facet, vec3 mirrored, vec3 p
         Flight next = flight;
         float ratio = 1.0 / vertex.material.ior;
         float onward = sqrt(max(1.0 - ratio * ratio * (1.0 - cosine * cosine), 0.0));
-        next.direction = trace_toward(normalize(ratio * flight.direction - (ratio * cosine + onward) * facet), -vertex.normal);
+        next.direction = trace_toward(normalize(ratio * flight.direction - (ratio * cosine + onward) * facet), -vertex.geometric);
         next.light = passed;
         next.seed = random_branch(flight.seed, REFRACTION);
         next.refractions = flight.refractions + 1;
@@ -319,20 +381,21 @@ void trace_sample(Ray ray, float depth, vec3 outward, uint seed, uint number) {
     waiting_count = 0u;
     for (uint i = 0u; i < MOST_FLIGHTS; i++) {
         bool is_eye = i == 0u;
-        TreeHit hit;
-        bool has_met = tree_cast(segment, begin, end, is_eye, flight.is_inside, false, hit);
+        SceneHit hit;
+        bool has_met = trace_cast(segment, begin, end, is_eye, flight.is_inside, false, hit);
         if (!is_eye)
             trace_see_lights(flight, has_met ? hit.t : ENDLESS);
         if (has_met || is_eye) {
             Vertex vertex;
             if (has_met) {
-                vertex = trace_vertex(segment, hit, flight.medium);
+                vertex = trace_vertex_of(segment, hit, flight.medium);
             } else {
                 // As the image has it.
                 bool is_within = dot(outward, flight.direction) > 0.0;
                 vec3 position = segment.start + t * segment.direction;
                 float lift = error + trace_rounding(segment.start, position);
-                vertex = Vertex(position, is_within ? -outward : outward, lift, is_within, AIR, 0, light_material(0u));
+                vec3 normal = is_within ? -outward : outward;
+                vertex = Vertex(position, normal, normal, lift, is_within, is_within, true, AIR, 0, light_material(0u));
                 hit.t = t;
             }
             float way = is_eye ? hit.t + anchor_depth * ray.stretch : hit.t;

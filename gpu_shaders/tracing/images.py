@@ -15,7 +15,9 @@ from ...addon.fluid.lighting import Lighting
 from ...addon.fluid.tracing import Tracing
 from ..context import GpuContext, shared_context
 from ..surface_textures import SurfaceTextures
-from .stage import TracedFluid, TracedLight
+from .stage import TracedFluid, TracedLight, TracedMeshes
+
+__all__ = ["ImageTracer", "TracedFluid", "TracedMeshes", "image_tracer"]
 
 FloatArray = npt.NDArray[np.float32]
 

@@ -32,6 +32,8 @@ class Variant:
         Whether any material lets light pass.
     with_world_image
         Whether the world has an image.
+    with_meshes
+        Whether there are triangles.
     """
 
     kernel: Kernel
@@ -40,6 +42,7 @@ class Variant:
     with_sources: bool = False
     lets_pass: bool = False
     with_world_image: bool = False
+    with_meshes: bool = False
 
     def program(self) -> ProgramSource:
         """A compute shader where the tree lies in storage buffers, else a fragment shader."""
@@ -54,6 +57,7 @@ class Variant:
             "WITH_SOURCES": int(self.with_sources),
             "LETS_PASS": int(self.lets_pass),
             "WITH_WORLD_IMAGE": int(self.with_world_image),
+            "WITH_MESHES": int(self.with_meshes),
         }
         named = tuple(sorted(constants.items()))
         if self.tree.with_storage:
@@ -66,5 +70,5 @@ def all_programs() -> Iterator[ProgramSource]:
     for storage in (False, True):
         for kernel, weights in product(KERNELS.values(), (False, True)):
             yield Variant(kernel, TreeVariant(storage, weights)).program()
-        for flags in product((False, True), repeat=4):
+        for flags in product((False, True), repeat=5):
             yield Variant(KERNELS["wyvill"], TreeVariant(storage), *flags).program()

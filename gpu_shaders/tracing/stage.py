@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import moderngl
@@ -12,10 +13,11 @@ from ...addon.fluid.balls import Balls
 from ...addon.fluid.camera import Camera
 from ...addon.fluid.field import Field
 from ...addon.fluid.lighting import Light, Lighting, Material
+from ...addon.fluid.meshes import Meshes
 from ...addon.fluid.tracing import Tracing
 from ...addon.render.fitted_bvh import TreeArrays
 from ...addon.render.method import Attribute
-from ..buffer_texture import BufferTexture
+from ..buffer_texture import BufferTexture, Numbers, Texels
 from ..compute_step import ComputeStep
 from ..context import GpuContext
 from ..stage_times import StageTimes
@@ -27,10 +29,30 @@ from ..tree_camera import tree_camera_uniforms
 from .programs import Variant
 
 _KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}
-_SCENE_BINDING, _SOURCES_BINDING = 6, 7
+_SCENE_BINDING = 6
+
+# Where each part is bound, and what its texels are.
+_PARTS: dict[str, tuple[int, Texels]] = {"sources": (7, "i1"), "triangle_nodes": (8, "u4"), "triangles": (9, "f4")}
 
 _MOST_DISTANCE = 3e38
 """Stands for no end in shaders."""
+
+
+@dataclass(frozen=True)
+class TracedMeshes:
+    """Meshes that light meets beside the fluid.
+
+    Attributes
+    ----------
+    meshes
+        The triangles, and what they are made of.
+    nodes, ids
+        (M, 8) float32 and (K,) uint32: the tree over them, as the native core gives it; world space.
+    """
+
+    meshes: Meshes
+    nodes: npt.NDArray[np.float32]
+    ids: npt.NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
@@ -43,12 +65,20 @@ class TracedFluid:
         The tree over the balls; its origin is that of scene coordinates.
     materials
         Of the balls' sources; their colours count where the balls have none.
+    meshes
+        What else there is; None for nothing.
     """
 
     tree: TreeArrays
     balls: Balls
     field: Field
     materials: tuple[Material, ...]
+    meshes: TracedMeshes | None = None
+
+    @property
+    def all_materials(self) -> tuple[Material, ...]:
+        """Those of the balls, and behind them those of the meshes."""
+        return self.materials + (self.meshes.meshes.materials if self.meshes is not None else ())
 
 
 class TracedLight:
@@ -68,7 +98,7 @@ class TracedLight:
         self._steps: dict[Variant, Step | ComputeStep] = {}
         self._fluid: TracedFluid | None = None
         self._buffers: TreeBuffers | None = None
-        self._sources: Texture | moderngl.Buffer | None = None
+        self._further: dict[str, BufferTexture | moderngl.Buffer] = {}
 
     def trace(
         self,
@@ -102,7 +132,7 @@ class TracedLight:
         """
         gl = self._context.gl
         buffers = self._uploaded(fluid)
-        balls, materials = fluid.balls, fluid.materials
+        balls, materials = fluid.balls, fluid.all_materials
         lets_pass = any(material.transmission > 0 and material.metallic < 1 for material in materials)
         with_image = lighting.image is not None and irradiance is not None
         variant = Variant(
@@ -112,6 +142,7 @@ class TracedLight:
             balls.sources is not None,
             lets_pass,
             with_image,
+            fluid.meshes is not None,
         )
         step = self._step_of(variant)
         step.set_uniforms(
@@ -144,8 +175,9 @@ class TracedLight:
     ) -> None:
         buffers.bind()
         Storage(self._context).of(texels).bind_to_storage_buffer(_SCENE_BINDING)
-        if isinstance(self._sources, moderngl.Buffer):
-            self._sources.bind_to_storage_buffer(_SOURCES_BINDING)
+        for name, buffer in self._further.items():
+            assert isinstance(buffer, moderngl.Buffer)
+            buffer.bind_to_storage_buffer(_PARTS[name][0])
         surface.textures["depth"].bind_to_image(0, read=True, write=False)
         surface.textures["normal"].bind_to_image(1, read=True, write=False)
         output.bind_to_image(2, read=False, write=True)
@@ -169,27 +201,28 @@ class TracedLight:
             "depth_tx": surface.textures["depth"],
             "normal_tx": surface.textures["normal"],
         }
-        if isinstance(self._sources, BufferTexture):
-            textures["sources_tx"] = self._sources
+        for name, texture in self._further.items():
+            assert isinstance(texture, BufferTexture)
+            textures[f"{name}_tx"] = texture
         step.draw_plainly(self._context.gl.framebuffer([output]), textures)
 
     def _uploaded(self, fluid: TracedFluid) -> TreeBuffers:
-        """The tree's buffers, which stay while the same tree is asked for."""
-        if self._buffers is None or self._fluid is None or self._fluid.tree is not fluid.tree:
-            self._buffers = self._sources = None  # their memory may be needed
+        """The trees' buffers, which stay while the same trees are asked for."""
+        known = self._fluid
+        if self._buffers is None or known is None or known.tree is not fluid.tree or known.meshes is not fluid.meshes:
+            self._buffers, self._further = None, {}  # their memory may be needed
             names: list[Attribute] = ["color"] if fluid.balls.colors is not None else []
             names += ["ball"] if fluid.balls.sources is not None else []
             attributes = frozenset(names)
             self._buffers = TreeBuffers(self._context, fluid.tree, fluid.balls, attributes, with_storage=self._with_storage)
-            if fluid.balls.sources is not None:
-                self._sources = self._uploaded_sources(fluid.balls.sources)
+            storage = Storage(self._context)
+            for name, array in _further_parts(fluid):
+                texels = _PARTS[name][1]
+                self._further[name] = (
+                    storage.of(array) if self._with_storage else BufferTexture.of(self._context, texels, array)
+                )
             self._fluid = fluid
         return self._buffers
-
-    def _uploaded_sources(self, sources: npt.NDArray[np.int32]) -> BufferTexture | moderngl.Buffer:
-        if self._with_storage:
-            return Storage(self._context).of(sources)
-        return BufferTexture.of(self._context, "i1", sources)
 
     def _world_textures(self, lighting: Lighting, irradiance: npt.NDArray[np.float32] | None) -> dict[str, moderngl.Texture]:
         images = {"world_tx": lighting.image.pixels if lighting.image else None, "irradiance_tx": irradiance}
@@ -200,6 +233,35 @@ class TracedLight:
             kind = ComputeStep if variant.tree.with_storage else Step
             self._steps[variant] = kind(self._context, variant.program())
         return self._steps[variant]
+
+
+def _further_parts(fluid: TracedFluid) -> Iterator[tuple[str, Numbers]]:
+    """What there is beside the tree over the balls, by name."""
+    if fluid.balls.sources is not None:
+        yield "sources", fluid.balls.sources
+    if fluid.meshes is not None:
+        yield "triangle_nodes", _moved_nodes(fluid.meshes.nodes, fluid.tree.origin)
+        yield "triangles", _triangle_texels(fluid.meshes, fluid.tree.origin, len(fluid.materials))
+
+
+def _moved_nodes(nodes: npt.NDArray[np.float32], origin: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+    """Boxes in scene coordinates, larger by what is rounded."""
+    moved = nodes.copy()
+    for columns, side in ((slice(0, 3), -np.inf), (slice(4, 7), np.inf)):
+        moved[:, columns] = np.nextafter((nodes[:, columns] - origin).astype(np.float32), np.float32(side))
+    return moved
+
+
+def _triangle_texels(traced: TracedMeshes, origin: npt.NDArray[np.float64], first_material: int) -> npt.NDArray[np.float32]:
+    """(K, 6, 4): corners and normals of the triangles of the leaves, in scene coordinates, and the materials."""
+    meshes = traced.meshes
+    # Between leaves there are gaps, which nobody reads.
+    ids = np.minimum(traced.ids, len(meshes.triangles) - 1)
+    texels = np.zeros((len(ids), 6, 4), np.float32)
+    texels[:, :3, :3] = meshes.vertices[meshes.triangles[ids]] - origin
+    texels[:, 0, 3] = meshes.material[ids] + first_material
+    texels[:, 3:, :3] = meshes.normals[ids]
+    return texels
 
 
 def scene_texels(
@@ -237,7 +299,7 @@ def _uniforms(
 ) -> dict[str, object]:
     radii = fluid.balls.radii
     uniforms: dict[str, object] = {
-        "material_count": len(fluid.materials),
+        "material_count": len(fluid.all_materials),
         "light_count": len(lighting.lights),
         "world_color": lighting.world,
         "radius_range": (float(radii.min()), float(radii.max())),

@@ -9,14 +9,16 @@ import pytest
 from scenes import SCENES, Scene
 
 import meniscus
-from meniscus.addon.fluid.lighting import Light, Lighting, Material, WorldImage
+from meniscus.addon.fluid.lighting import FluidSource, Light, Lighting, Material, WorldImage
+from meniscus.addon.fluid.meshes import Meshes, MeshObject
 from meniscus.addon.fluid.tracing import Tracing
-from meniscus.addon.render import native, renderer
+from meniscus.addon.render import native, registry, renderer
+from meniscus.addon.render.backdrop import backdrop
 from meniscus.addon.render.fitted_bvh import FittedBvh
 from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method, method_infos
 from meniscus.addon.render.tracing import SeenSurface, TracedScene, trace_image
-from meniscus.gpu_shaders.tracing import images
+from meniscus.gpu_shaders.tracing import images, stage
 from meniscus.gpu_shaders.tracing.stage import TracedFluid, TracedLight
 
 MEMORIES = pytest.mark.parametrize("with_storage", [False, True], ids=["textures", "storage"])
@@ -50,16 +52,16 @@ class Traced:
         balls, camera = self.scene.balls, self.scene.camera(projection)
         request = Request(balls, camera, self.scene.field, frozenset({"color"}), 0, lambda _: None)
         surface = create_method(method)[1].find_surface_on_device(request)
-        stage = TracedLight(opengl, with_storage)
-        found = opengl.run(lambda: self._on_device(stage, surface, camera))
+        light = TracedLight(opengl, with_storage)
+        found = opengl.run(lambda: self._on_device(light, surface, camera))
         passes = surface.read_back()
         return found, self._on_cpu(passes, camera), passes["depth"] < 1e9
 
-    def _on_device(self, stage, surface, camera):
+    def _on_device(self, light, surface, camera):
         balls, image = self.scene.balls, self.lighting.image
         fluid = TracedFluid(FittedBvh(balls, self.scene.field).arrays(), balls, self.scene.field, self.materials)
         irradiance = None if image is None else native.load().WorldImage(image.pixels).irradiance()
-        texture = stage.trace(
+        texture = light.trace(
             surface, camera, fluid, self.lighting, self.tracing, irradiance, 3 * self.tracing.samples, self.is_film_clear
         )
         return np.frombuffer(texture.read(), np.float32).reshape(camera.height, camera.width, 4)
@@ -210,3 +212,56 @@ def test_one_ball_without_any_light_is_black(hardware):
     )
     assert picture[..., 3].any()
     assert not picture[..., :3].any()
+
+
+def floor_and_roof() -> Meshes:
+    """A glossy floor below the fluid, and a pane of glass before it."""
+    floor = [[-3, -3, -1.2], [3, -3, -1.2], [3, 3, -1.3], [-3, 3, -1.3]]
+    pane = [[-0.9, -1.7, -0.6], [0.9, -1.6, -0.6], [0.9, -1.6, 0.7], [-0.9, -1.7, 0.7]]
+    backs = [[x, y + 0.1, z] for x, y, z in pane]
+    vertices = np.array([*floor, *pane, *backs], np.float32)
+    quads = np.array([[0, 1, 2, 3], [4, 5, 6, 7], [11, 10, 9, 8]], np.int32)
+    triangles = np.ascontiguousarray(np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    sides = vertices[triangles].astype(np.float64)
+    normals = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    tiles = Material(color=(0.7, 0.3, 0.2), roughness=0.3)
+    return Meshes(
+        vertices,
+        triangles,
+        np.repeat(normals[:, None], 3, axis=1).astype(np.float32),
+        np.zeros(6, np.int32),
+        np.array([0, 1, 1, 0, 1, 1], np.int32),
+        (MeshObject("room"),),
+        (tiles, replace(GLASS, roughness=0.0)),
+    )
+
+
+@pytest.mark.parametrize("with_storage", [False, True], ids=["textures", "storage"])
+@pytest.mark.parametrize("material", [GLASS, MATT], ids=["glass", "matt"])
+def test_meshes_are_seen_and_hide_light(hardware, monkeypatch, material, with_storage):
+    monkeypatch.setattr(stage, "uses_storage", lambda _: with_storage)
+    monkeypatch.setattr(images, "image_tracer", lambda: images.ImageTracer(registry.gpu().shared_context()))
+    scene = SCENES["ten_balls"]()
+    camera, room = scene.camera("perspective"), floor_and_roof()
+    source = FluidSource("fluid", material=material)
+    look = meniscus.Look(style="material", lighting=ROOM, tracing=Tracing(occlusion_rays=4), sources=(source,))
+    look = replace(look, color=material.color)
+    pictures = [
+        meniscus.render(
+            scene.balls,
+            camera,
+            scene.field,
+            method,
+            passes=("combined",),
+            look=look,
+            backdrop=backdrop(room, camera, ROOM, (0.0, 0.0, 0.0, 1.0)),
+        )
+        for method in ("fitted_bvh", "tile_caster")
+    ]
+    assert len(hardware) == 1
+    found, wanted = (picture["combined"] for picture in pictures)
+    assert wanted[..., 3].mean() > 0.5
+    assert np.ptp(wanted[..., :3]) > 0.2
+    assert np.mean(np.abs(found - wanted).max(axis=2) > 4e-3) <= 5e-3
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), wanted.mean(axis=(0, 1)), rtol=2e-3)
