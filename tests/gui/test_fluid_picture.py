@@ -111,7 +111,7 @@ def test_a_rendered_viewport_traces_light(fluid, ring):
     scene = bpy.context.scene
     scene.render.engine, scene.meniscus.use_tracing = "MENISCUS", True
     scene.meniscus.preview_samples = 3
-    scene.objects["Light"].location, scene.objects["Light"].data.energy = (0.5, -0.5, 8), 3000
+    scene.objects["Light"].location, scene.objects["Light"].data.energy = (3, -7, 0.5), 3000
     scene.objects["Light"].data.shadow_soft_size = 0.0
     nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
     texture = nodes.new("ShaderNodeTexEnvironment")
