@@ -34,7 +34,7 @@ OVERCAST = Lighting((), world=(0.8, 0.8, 0.8))
 MATT = Material(color=(0.8, 0.5, 0.3))
 WATER = Material(color=(1.0, 1.0, 1.0), roughness=0.0, transmission=1.0, ior=1.33, absorption=(0.9, 0.3, 0.1))
 MERCURY = Material(color=(0.8, 0.8, 0.85), roughness=0.0, metallic=1.0)
-# What light does, and how far it is followed. "mirror 3" has no refraction: Fresnel's share of a dark body is mirrored three times.
+# What light does, and how far it is followed. "mirror 3" has no refraction: what a dark body mirrors is mirrored three times.
 STUDIES: Mapping[str, tuple[Material, Lighting, Tracing]] = {
     "shadows": (MATT, DAY, Tracing(reflections=0)),
     "occlusion 64": (MATT, OVERCAST, Tracing(reflections=0, occlusion_rays=64)),
