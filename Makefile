@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-viewport bench-export bench-light bench-scaling lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-viewport bench-export bench-gourmel bench-light bench-scaling lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -46,6 +46,9 @@ bench-scaling: setup ## Time each method against balls, resolution, density and 
 
 bench-light: setup ## Time primary rays, shadows, occlusion and reflections on the GPU (ARGS="--size 640x480 --scenes 'pool 10k'")
 	@PYTHONPATH=tests $(VENV) -m bench.traced_light $(ARGS)
+
+bench-gourmel: setup ## Time traced light on the scenes of docs/gourmel_2010.md (ARGS="--scenes pool --pictures")
+	@PYTHONPATH=tests $(VENV) -m bench.gourmel_2010 $(ARGS)
 
 bench-export: setup ## Time passes and files beside the surface, and watch the memory over 500 frames (ARGS="--frames 10")
 	@PYTHONPATH=tests $(VENV) -m bench.export $(ARGS)

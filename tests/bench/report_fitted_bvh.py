@@ -1,4 +1,4 @@
-"""Prints the tables of docs/fitted_bvh.md: .venv/bin/python tests/bench/report_fitted_bvh.py
+"""Prints the tables of docs/fitted_bvh.md: PYTHONPATH=tests .venv/bin/python -m bench.report_fitted_bvh
 
 What Gourmel et al. 2010 measure in tables 1 and 3 to 5, on scenes like theirs and on dense ones: the tree with and without
 each refinement. Counts are exact; times are processor time, the least of several
@@ -16,47 +16,15 @@ import meniscus
 from meniscus.addon.render.fitted_bvh import RayCounts
 from meniscus.samples import scattered
 
+from .gourmel_scenes import FIELD, molecule, pool, tornado
+
 WIDTH, HEIGHT = 640, 480
 RUNS = 5
-FIELD = meniscus.Field("wyvill", 0.2)
 
 OURS: Mapping[str, object] = {}
 PAPER = {"proves": False}
 OVERLAPPING = {"hierarchy": "overlapping", "proves": False}
 PLAIN = {"tightens": False, "discards": False, "proves": False}
-
-
-def tornado(count: int) -> meniscus.Balls:
-    """A swirl that widens upwards: thin walls at its foot, a cloud at its head."""
-    random = np.random.default_rng(1)
-    height = random.random(count) ** 0.7
-    angle = 6 * np.pi * height + random.normal(0, 0.5, count) + np.pi * random.integers(0, 2, count)
-    distance = (0.1 + 0.5 * height**2) * (1 + 0.25 * random.normal(size=count))
-    positions = np.stack([distance * np.cos(angle), distance * np.sin(angle), 2 * height], axis=1)
-    return meniscus.Balls(positions, 2.2 * count ** (-1 / 3) * (0.2 + height))
-
-
-def molecule() -> meniscus.Balls:
-    """A long chain that folds back on itself, atoms of three sizes."""
-    random = np.random.default_rng(2)
-    steps = random.normal(size=(1360, 3))
-    chain = np.zeros((1360, 3))
-    for index in range(1, len(chain)):
-        step = steps[index] - 0.05 * chain[index - 1]
-        chain[index] = chain[index - 1] + step / np.linalg.norm(step)
-    atoms = (chain[:, None] + 0.6 * random.normal(size=(1360, 4, 3))).reshape(-1, 3)
-    return meniscus.Balls(atoms, random.choice([0.9, 1.1, 1.3], len(atoms)))
-
-
-def pool(count: int = 10_000) -> meniscus.Balls:
-    """A shallow basin of water with waves, and drops above it."""
-    random = np.random.default_rng(3)
-    spacing = (4 * 4 * 0.5 / count) ** (1 / 3)
-    x, y, z = (axis.ravel() for axis in np.meshgrid(*(np.arange(0, edge, spacing) for edge in (4, 4, 0.5)), indexing="ij"))
-    z = z * (1 + 0.3 * np.sin(3 * x) * np.cos(2.3 * y))
-    water = np.stack([x, y, z], axis=1) + random.uniform(-0.2, 0.2, (len(x), 3)) * spacing
-    drops = random.uniform((0, 0, 0.8), (4, 4, 1.6), (count // 50, 3))
-    return meniscus.Balls(np.concatenate([water, drops]), 2 * spacing)
 
 
 def dense(count: int) -> meniscus.Balls:
