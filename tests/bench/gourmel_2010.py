@@ -1,4 +1,4 @@
-"""`make bench-light`: the experiments of Gourmel et al. 2010 with traced light, the paper's frames a second beside ours."""
+"""`make bench-gourmel`: the experiments of Gourmel et al. 2010 with traced light, the paper's frames a second beside ours."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COLORS = 256
 
 
 def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="make bench-light", description="Time traced light on the scenes of a paper.")
+    parser = argparse.ArgumentParser(prog="make bench-gourmel", description="Time traced light on the scenes of a paper.")
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES), metavar="NAME", help=", ".join(SCENES))
     parser.add_argument("--repeats", type=int, default=7, help="measured rounds of a case")
     parser.add_argument("--pictures", action="store_true", help="render the pictures of docs/gourmel_2010.md instead")
