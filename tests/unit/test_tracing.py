@@ -347,6 +347,15 @@ def test_fluid_shadows_meshes_and_clear_fluid_lets_light_pass():
     assert render(BALL, tinted, sun, Tracing(refractions=1), camera, floor)[0][20, 20, 0] == 0
 
 
+def test_rough_surfaces_have_no_sparks_of_lights_behind_glass():
+    floor = quad([(-3, -3, -1), (3, -3, -1), (3, 3, -1), (-3, 3, -1)], Material((0.8, 0.8, 0.8), metallic=1.0, roughness=0.6))
+    camera = meniscus.Camera.orthographic((0, 0, -0.8), (0, 0, -1), up=(0, 1, 0), scale=4.0, width=60, height=60)
+    sun = Lighting((Light("SUN", (1.0, 1.0, 1.0), direction=(0.6, 0.0, -0.8), radius=0.02),), (0.5, 0.5, 0.5))
+    image, _ = render(BALL, GLASS, sun, Tracing(samples=16), camera, floor)
+    # The sun's disc is 800 times as bright.
+    assert image.max() < 4
+
+
 def test_a_clear_film_is_seen_through_clear_bodies():
     tinted = replace(GLASS, color=(0.81, 0.36, 0.09), ior=1.0)
     image, hit = render(BALL, tinted, WHITE, background=CLEAR)

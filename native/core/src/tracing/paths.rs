@@ -47,6 +47,8 @@ struct Path {
     refractions: u32,
     /// Whether it passed all surfaces that it met.
     is_straight: bool,
+    /// The greatest width of facets that mirrored it from outside. Smaller lights are not seen behind them: they would be sparks.
+    spread: f64,
 }
 
 /// What a ray is cast for.
@@ -54,9 +56,8 @@ struct Path {
 enum Purpose {
     /// Finds the surface of its pixel again, exactly.
     Eye,
-    /// Light that comes from whatever it meets. Lights of a size are seen where the sine of half their angle is greater than
-    /// `lobe`; others were counted where it began.
-    Gather { lobe: f64 },
+    /// Light that comes from whatever it meets, also from lights that were not counted where it began.
+    Gather,
     /// Brings light from a light, as far as what it meets lets it pass.
     Shadow,
 }
@@ -205,8 +206,14 @@ impl<'a, S: Simd> Tracer<'a, S> {
             let length = dot(way, way).sqrt();
             let (direction, t) = (unit(way), depth * length);
             let error = depth_error(surfaces, self.scene, pixel, t);
-            let path =
-                Path { pixel: index, seed: random::mixed(pixel as u32 + 1), reflections: 0, refractions: 0, is_straight: true };
+            let path = Path {
+                pixel: index,
+                seed: random::mixed(pixel as u32 + 1),
+                reflections: 0,
+                refractions: 0,
+                is_straight: true,
+                spread: 0.0,
+            };
             let ray = Ray { origin, direction, t_min: (t - error).max(view.clip[0] * length).min(t), t_max: t + error };
             self.flights.push(Flight { ray, light: [1.0; 3], path, medium: AIR, purpose: Purpose::Eye });
         }
@@ -257,8 +264,8 @@ impl<'a, S: Simd> Tracer<'a, S> {
     /// What comes of a ray that met a surface, or none.
     fn land(&mut self, mut flight: Flight, arrival: Option<Arrival>) {
         let pixel = flight.path.pixel;
-        if let Purpose::Gather { lobe } = flight.purpose {
-            self.see_lights(&flight, lobe, arrival.map_or(f64::INFINITY, |arrival| arrival.t));
+        if flight.purpose == Purpose::Gather {
+            self.see_lights(&flight, arrival.map_or(f64::INFINITY, |arrival| arrival.t));
         }
         let Some(mut arrival) = arrival else {
             return match flight.purpose {
@@ -280,10 +287,10 @@ impl<'a, S: Simd> Tracer<'a, S> {
     }
 
     /// Adds the lights that a ray sees before it ends.
-    fn see_lights(&mut self, flight: &Flight, lobe: f64, end: f64) {
+    fn see_lights(&mut self, flight: &Flight, end: f64) {
         let Ray { origin, direction, .. } = flight.ray;
         for light in self.scene.lights {
-            if lights::extent(light, origin) > lobe {
+            if lights::extent(light, origin) > flight.path.spread {
                 let radiance = lights::seen(light, origin, direction, end);
                 add(&mut self.radiance[flight.path.pixel], times(flight.light, radiance));
             }
@@ -365,7 +372,8 @@ impl<'a, S: Simd> Tracer<'a, S> {
         let Vertex { flight, arrival, position, is_within } = &self.vertices[vertex];
         let (source, material) = (&self.scene.lights[light], &self.scene.materials[arrival.material as usize]);
         // From within the light is not where a straight line says; and facets see lights that are wider than what they gather.
-        let is_gathered = *is_within || lights::extent(source, *position) > alpha(material.roughness);
+        let spread = flight.path.spread.max(alpha(material.roughness));
+        let is_gathered = *is_within || lights::extent(source, *position) > spread;
         let sent = if is_gathered { diffuse } else { std::array::from_fn(|channel| diffuse[channel] + gloss[channel]) };
         let light = times(times(flight.light, sent), shine.irradiance);
         if light.iter().all(|channel| *channel <= 0.0) {
@@ -447,14 +455,16 @@ impl<'a, S: Simd> Tracer<'a, S> {
     }
 
     /// A ray for the light from a direction; the last of a path sees lights and world at once.
-    fn gather(&mut self, vertex: &Vertex, direction: [f64; 3], light: [f32; 3], path: Path, is_last: bool, passes: bool) {
+    fn gather(&mut self, vertex: &Vertex, direction: [f64; 3], light: [f32; 3], mut path: Path, is_last: bool, passes: bool) {
         let ray = vertex.leaving(direction, f64::INFINITY, passes);
         let medium = if passes { vertex.beyond() } else { vertex.flight.medium };
         let roughness = self.scene.materials[vertex.arrival.material as usize].roughness;
-        let lobe = if passes || vertex.is_within { 0.0 } else { alpha(roughness) };
-        let flight = Flight { ray, light, path, medium, purpose: Purpose::Gather { lobe } };
+        if !(passes || vertex.is_within) {
+            path.spread = path.spread.max(alpha(roughness));
+        }
+        let flight = Flight { ray, light, path, medium, purpose: Purpose::Gather };
         if is_last || is_dim(light) {
-            self.see_lights(&flight, lobe, f64::INFINITY);
+            self.see_lights(&flight, f64::INFINITY);
             self.escape(&path, light, direction);
         } else {
             self.next.push(flight);
