@@ -113,9 +113,12 @@ def no_opengl(monkeypatch):
     def fail():
         raise DeviceError("OpenGL 3.3 is not available here")
 
+    # Loaded before, or they would keep the function that fails.
+    names = ("tile_lists", "fitted_bvh", "depth_peeling")
+    modules = [registry._import(f"gpu_shaders.methods.{name}", "method") for name in names]
     monkeypatch.setattr(registry.gpu(), "shared_context", fail)
-    for name in ("tile_lists", "fitted_bvh", "depth_peeling"):
-        monkeypatch.setattr(registry._import(f"gpu_shaders.methods.{name}", "method"), "create", fail)
+    for module in modules:
+        monkeypatch.setattr(module, "create", fail)
 
 
 def test_the_fastest_method_is_taken_and_says_why(monkeypatch):
