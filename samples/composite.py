@@ -66,12 +66,17 @@ def render(scene: bpy.types.Scene, path: Path, frame: int, samples: int) -> None
     scene.cycles.use_denoising = False  # not every build of Blender can
     scene.frame_set(frame)
     bpy.ops.meniscus.add_compositing()
+    save_as_png(scene, path)
+    bpy.ops.render.render(write_still=True)
+
+
+def save_as_png(scene: bpy.types.Scene, path: Path) -> None:
+    """Let renders of a scene be saved as a PNG picture."""
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # since 5.0
         settings.media_type = "IMAGE"
     settings.file_format = "PNG"
     scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
 
 
 def _paint(item: bpy.types.Object, color: scene_parts.Point, roughness: float, transmission: float = 0.0) -> None:
