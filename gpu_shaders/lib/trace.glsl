@@ -60,7 +60,8 @@ struct Flight {
     vec3 origin;
     vec3 direction;
     vec3 light; // the share of the light that it finds
-    float lobe; // lights of a size are seen where the sine of half their angle is greater
+    // The greatest width of facets that mirrored it from outside; smaller lights are not seen behind them: they would be sparks.
+    float spread;
     uint seed;
     int reflections;
     int refractions;
@@ -83,7 +84,7 @@ struct Vertex {
     Material material;
 };
 
-vec4 waiting_origin[MOST_WAITING]; // and lobe
+vec4 waiting_origin[MOST_WAITING]; // and spread
 vec3 waiting_direction[MOST_WAITING];
 vec3 waiting_light[MOST_WAITING];
 uvec2 waiting_bits[MOST_WAITING];
@@ -93,7 +94,7 @@ vec3 behind; // the share of what lies behind everything
 
 void trace_push(Flight flight) {
     uint place = min(waiting_count, MOST_WAITING - 1u);
-    waiting_origin[place] = vec4(flight.origin, flight.lobe);
+    waiting_origin[place] = vec4(flight.origin, flight.spread);
     waiting_direction[place] = flight.direction;
     waiting_light[place] = flight.light;
     uint flags = uint(flight.is_straight) | uint(flight.is_inside) << 1u | uint(flight.reflections) << 2u;
@@ -137,7 +138,7 @@ void trace_escape(Flight flight) {
 void trace_see_lights(Flight flight, float end) {
     for (uint i = 0u; i < light_count; i++) {
         Light light = light_source(i);
-        if (light_extent(light, flight.origin) > flight.lobe)
+        if (light_extent(light, flight.origin) > flight.spread)
             radiance += flight.light * light_seen(light, flight.origin, flight.direction, end);
     }
 }
@@ -285,7 +286,8 @@ void trace_gather(Vertex vertex, Flight flight, vec3 matt, uint number) {
             Light light = light_source(i);
             Shine shine = light_shine(light, vertex.position, random_square(random_branch(flight.seed, LIGHTS + i), number));
             // From within the light is not where a straight line says; and facets see lights that are wider than what they gather.
-            bool is_gathered = vertex.is_within || light_extent(light, vertex.position) > light_alpha(vertex.material.roughness);
+            float spread = max(flight.spread, light_alpha(vertex.material.roughness));
+            bool is_gathered = vertex.is_within || light_extent(light, vertex.position) > spread;
             vec3 sent = light_sent(vertex.material, matt, vertex.normal, to_eye, shine.toward, !is_gathered);
             if (dot(shine.toward, vertex.normal) > 0.0)
                 brings = flight.light * shine.irradiance * sent;
@@ -311,7 +313,8 @@ void trace_send(Vertex vertex, Flight flight, bool is_last, bool passes) {
     flight.origin = vertex_leaving(vertex, passes);
     flight.is_inside = vertex_leaving_inside(vertex, passes);
     flight.medium = passes ? vertex_beyond(vertex) : vertex.medium;
-    flight.lobe = passes || vertex.is_within ? 0.0 : light_alpha(vertex.material.roughness);
+    if (!passes && !vertex.is_within)
+        flight.spread = max(flight.spread, light_alpha(vertex.material.roughness));
     if (is_last || all(lessThan(flight.light, vec3(DIM)))) {
         trace_see_lights(flight, ENDLESS);
         trace_escape(flight);
