@@ -55,7 +55,7 @@ class Light:
     position
         Where it is; a sun's does not count.
     direction
-        Unit vector: where it shines, along its own -z.
+        Where it shines, along its own -z; a vector of another length is made a unit vector.
     cone
         Of a spot: cosine of half its angle, and the share of the cone over which its border is soft.
     radius
@@ -64,11 +64,16 @@ class Light:
     size
         Of an area light: width and height, Blender units.
     right
-        Of an area light: unit vector along its width; its height is along ``cross(right, direction)``.
+        Of an area light: along its width, made a unit vector; its height is along ``cross(right, direction)``.
     is_round
         Whether an area light is an ellipse with that width and height; else it is a rectangle.
     casts_shadow
         Whether what stands in its way hides it, where light is traced.
+
+    Raises
+    ------
+    InputError
+        A vector has no length.
     """
 
     kind: Literal["SUN", "POINT", "SPOT", "AREA"]
@@ -81,6 +86,15 @@ class Light:
     right: Vector = (1.0, 0.0, 0.0)
     is_round: bool = False
     casts_shadow: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("direction", "right"):
+            # A vector that is a little too short would let surfaces hide themselves.
+            x, y, z = getattr(self, name)
+            length = math.hypot(x, y, z)
+            if not 0 < length < math.inf:
+                raise InputError(f"The {name} of a light must be a vector with a length, not {(x, y, z)}: turn the light")
+            object.__setattr__(self, name, (x / length, y / length, z / length))
 
     @property
     def area(self) -> float:

@@ -24,7 +24,7 @@ PAGE = report.ROOT / "docs" / "gourmel_2010.md"
 IMAGES = report.ROOT / "docs" / "images"
 METHOD = "tile_caster"
 SIZE = (640, 480)
-PICTURE_SAMPLES = 16
+PICTURE_SAMPLES = 4
 """Of each pixel of a picture, so that soft light has little noise."""
 FINER = 2
 """Pictures are rendered so many times as large, and then averaged."""

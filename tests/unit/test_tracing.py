@@ -221,6 +221,19 @@ def test_the_shadow_of_a_sphere_has_its_edge():
         np.testing.assert_allclose(image[..., 0], lit, atol=2e-3)
 
 
+def test_a_sun_need_not_have_a_unit_vector():
+    """A direction that is hardly too short must not let a body hide itself."""
+    images = []
+    for length in (1.0, 0.9975, 3.0):
+        sun = Light("SUN", (1.0, 1.0, 1.0), direction=(0.6 * length, 0.0, -0.8 * length))
+        images.append(render(BALL, DULL, Lighting((sun,)), Tracing())[0])
+    assert images[0][..., 0].max() > 0.2
+    np.testing.assert_allclose(images[1], images[0], atol=1e-6)
+    np.testing.assert_allclose(images[2], images[0], atol=1e-6)
+    with pytest.raises(InputError, match="The direction of a light must be a vector with a length"):
+        Light("SUN", (1.0, 1.0, 1.0), direction=(0.0, 0.0, 0.0))
+
+
 def test_occlusion_is_what_a_sphere_hides():
     image, _ = render(GROUND, DULL, WHITE, Tracing(occlusion_rays=1024), ABOVE)
     points = ground_points(ABOVE)
