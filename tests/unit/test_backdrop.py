@@ -10,10 +10,10 @@ import pytest
 import meniscus
 from meniscus.addon.fluid.camera import Region, Window
 from meniscus.addon.fluid.errors import CancelledError, InputError
-from meniscus.addon.fluid.lighting import Light, Lighting, Material
+from meniscus.addon.fluid.lighting import Light, Lighting, Material, WorldImage
 from meniscus.addon.fluid.meshes import Meshes, MeshObject
 from meniscus.addon.fluid.passes import DEPTH_BACKGROUND
-from meniscus.addon.render.backdrop import backdrop
+from meniscus.addon.render.backdrop import Surroundings, backdrop
 from meniscus.addon.render.surroundings import Motion
 
 DARK = Lighting((), (0.0, 0.0, 0.0))
@@ -223,3 +223,25 @@ def test_cancelling_raises_what_the_caller_raised():
 def test_unusable_arrays_are_refused_with_a_sentence(changes, sentence):
     with pytest.raises(InputError, match=sentence):
         replace(meshes_of(np.eye(3)[None]), **changes)
+
+
+def test_cameras_and_traced_light_meet_what_is_theirs():
+    """With the numbers of objects and materials that all of them have; the background is a colour or the world's image."""
+    front = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+    camera = meniscus.Camera.orthographic((0, 0, 5), (0, 0, 0), up=(0, 1, 0), scale=2.0, width=21, height=21)
+    both = meshes_of([np.array(front), np.array(front) + (0, 0, 1)], objects=[0, 1])
+    meshes = replace(both, objects=(replace(both.objects[0], is_traced=False), replace(both.objects[1], is_seen=False)))
+    seen = Surroundings(meshes, DARK, is_film_clear=True).backdrop(camera)
+    assert seen.depth[10, 10] == pytest.approx(5)
+    assert seen.object[10, 10] == 0
+    np.testing.assert_array_equal(seen.meshes.object, [1])
+    assert seen.meshes.objects == meshes.objects
+    assert seen.meshes is meshes.traced, "trees belong to one"
+    nothing = Surroundings(meshes.unseen, DARK, is_film_clear=True).backdrop(camera)
+    assert not nothing.is_seen.any()
+    assert len(nothing.meshes) == 1
+    assert Surroundings(None, DARK, is_film_clear=True).backdrop(camera) is None
+    sky = WorldImage(np.full((4, 8, 3), 0.25, np.float32))
+    world = Surroundings(meshes, Lighting((), sky.mean, sky), is_film_clear=False).backdrop(camera)
+    np.testing.assert_allclose(world.rgba[20, 0], (0.25, 0.25, 0.25, 1))
+    assert not world.is_film_clear

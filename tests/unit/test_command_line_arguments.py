@@ -105,3 +105,17 @@ def test_help_names_every_option(capsys: pytest.CaptureFixture[str]) -> None:
         "json",
     ):
         assert f"--{option}" in shown
+
+
+def test_ray_tracing_is_left_to_the_scene_or_said() -> None:
+    names = ("ray_tracing", "reflections", "refractions", "occlusion_rays", "light_samples")
+    assert [getattr(parsed(), name) for name in names] == [None] * 5
+    said = parsed("--ray-tracing", "--reflections=2", "--refractions=0", "--occlusion-rays=16", "--light-samples=4")
+    assert [getattr(said, name) for name in names] == [True, 2, 0, 16, 4]
+    assert parsed("--no-ray-tracing").ray_tracing is False
+
+
+def test_numbers_of_rays_are_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parsed("--reflections=1.5")
+    assert "'1.5' is no whole number; write 0 or more" in capsys.readouterr().err

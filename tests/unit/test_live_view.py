@@ -11,6 +11,7 @@ import pytest
 import meniscus
 from meniscus.addon.fluid.errors import CancelledError, DeviceError
 from meniscus.addon.fluid.image import ImageBuffers, RenderInfo
+from meniscus.addon.fluid.tracing import Tracing
 from meniscus.addon.render.live_view import LiveRenderer, View
 from meniscus.addon.render.pace import Pace
 from meniscus.addon.render.samples import sample_offset
@@ -338,3 +339,19 @@ def test_what_the_next_balls_need_is_begun_while_the_last_are_drawn(fake):
     finally:
         fake.going.set()
         renderer.close()
+
+
+def test_light_goes_less_far_while_a_view_moves(renderer, fake):
+    """And what was shown then is no sample of what rests, however large it was; each sample has other rays."""
+    asked = []
+    renderer._render = lambda *arguments, look, sample, **names: (
+        asked.append((look.tracing.samples, look.tracing.reflections, sample)) or fake(*arguments, **names)
+    )
+    look = meniscus.Look("material", tracing=Tracing(reflections=5, samples=3))
+    view = replace(VIEW, look=look, camera=CAMERA.resized(100, 60), samples=3)
+    live = renderer.open()
+    live.show(view)
+    rest(live)
+    assert asked == [(1, 2, 0), (3, 5, 0), (3, 5, 1), (3, 5, 2)]
+    assert fake.widths == [100] * 4
+    assert [picture.is_hurried for picture in live.pictures] == [False] * 3
