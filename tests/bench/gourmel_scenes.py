@@ -30,7 +30,7 @@ CHALK = Material((0.85, 0.82, 0.75), roughness=1.0)
 WATER = Material((1.0, 1.0, 1.0), roughness=0.0, transmission=1.0, ior=1.33, absorption=(0.9, 0.25, 0.12))
 TILES = Material((0.75, 0.72, 0.66), roughness=0.6), Material((0.16, 0.32, 0.38), roughness=0.6)
 
-SUN = Light("SUN", (3.0, 2.9, 2.7), direction=(-0.45, 0.55, -0.7))
+SUN = Light("SUN", (3.0, 2.9, 2.7), direction=(-0.85, 0.2, -0.5))
 """Sharp shadows, as the paper's."""
 
 
