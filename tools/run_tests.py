@@ -28,8 +28,8 @@ from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
-HOSTS_AT_ONCE = 2
-"""Hosts without a window that are tested beside one another; each takes little more than one processor."""
+SUITES_AT_ONCE = 2
+"""Of pytest, without a window, that run beside one another; each takes little more than one processor."""
 
 
 @dataclass
@@ -46,12 +46,12 @@ class Result:
 
 def run_all() -> list[Result]:
     ensure_test_programs()
-    with ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as downloading, ThreadPoolExecutor(HOSTS_AT_ONCE) as beside:
+    with ThreadPoolExecutor(1) as compiling, ThreadPoolExecutor(1) as downloading, ThreadPoolExecutor(SUITES_AT_ONCE) as beside:
         compiling.submit(native_tests.compile_tests)
         nightly = compiling.submit(rust.nightly)
         wheels = compiling.submit(extension_wheels.collect)
         ready = {name: downloading.submit(hosts.prepare, name) for name in hosts.names()}
-        results = [check("lint", lint.lint), pytest_suite("unit"), pytest_suite("render")]
+        results = [check("lint", lint.lint), *beside.map(pytest_suite, ("unit", "render"))]
         results += [native_suite(name) for name in native_tests.stable_suites()]
         results += [native_suite(name, nightly) for name in native_tests.NIGHTLY_SUITES]
         results.append(check("extension", lambda: build_after(wheels)))
@@ -87,19 +87,22 @@ def check(name: str, action: Callable[[], object]) -> Result:
 
 def pytest_suite(name: str, *options: str) -> Result:
     """Run tests/NAME in the development environment."""
-    announce(name)
     command = [sys.executable, "-m", "pytest", "-q", "--junitxml", str(report_of(name)), f"tests/{name}", *options]
-    status = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
-    return result_of(name, status)
+    return run_suite(name, name, command)
 
 
 def host_suite(name: str, setup: Future[None]) -> Result:
-    """Run the suite of a host, once that is set up; what it says is shown in one piece, because another may run beside it."""
+    """Run the suite of a host, once that is set up."""
     try:
         setup.result()
     except ToolError as error:
         return missing_suite(name, error)
     command = [sys.executable, str(ROOT / "tools" / "hosts.py"), "--report", str(report_of(name)), name, "-q"]
+    return run_suite(name, f"Blender tests: {name}", command)
+
+
+def run_suite(name: str, title: str, command: list[str]) -> Result:
+    """Run a suite that writes a report; what it says is shown in one piece, because another may run beside it."""
     done = subprocess.run(
         command,
         cwd=ROOT,
@@ -110,7 +113,7 @@ def host_suite(name: str, setup: Future[None]) -> Result:
         errors="replace",
         check=False,
     )
-    announce(f"Blender tests: {name}", done.stdout)
+    announce(title, done.stdout)
     return result_of(name, done.returncode)
 
 
