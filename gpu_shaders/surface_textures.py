@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterable
+from typing import TypeVar
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from ..addon.fluid.camera import Region
 from ..addon.fluid.errors import DeviceError
 from ..addon.fluid.passes import DEPTH_BACKGROUND
-from ..addon.render.method import Attribute
+from ..addon.render.method import Attribute, Surface
 from .context import GpuContext
+
+Number = TypeVar("Number", int, float)
 
 _FORMATS: dict[str, tuple[int, str]] = {
     "depth": (1, "f4"),
@@ -77,8 +81,8 @@ class SurfaceTextures:
 
     def add_report(self, milliseconds: dict[str, float], counts: dict[str, int]) -> None:
         """Add times and counts to those that are there."""
-        for numbers, more in ((self.milliseconds, milliseconds), (self.counts, counts)):
-            numbers |= {name: numbers.get(name, 0) + number for name, number in more.items()}
+        _add(self.milliseconds, milliseconds)
+        _add(self.counts, counts)
 
     def clear(self) -> None:
         """Make it the surface of nothing, of which nothing is reported."""
@@ -94,6 +98,14 @@ class SurfaceTextures:
         texture = self.textures[name]
         pixels = np.frombuffer(texture.read(), texture.dtype).reshape(height, width, texture.components)
         return pixels[..., 0] if texture.components == 1 else pixels[..., :3]
+
+    def read_into(self, surface: Surface, region: Region) -> None:
+        """Fill a region of a surface, and add the times and counts to its own."""
+        rows, columns = slice(region.y_min, region.y_max), slice(region.x_min, region.x_max)
+        for name in self.passes:
+            getattr(surface, name)[rows, columns] = self.read(name)
+        _add(surface.milliseconds, self.milliseconds)
+        _add(surface.counts, self.counts)
 
     def read_back(self) -> dict[str, npt.NDArray[np.float32]]:
         """See :meth:`method.DeviceSurface.read_back`."""
@@ -129,3 +141,9 @@ class SurfaceTextures:
 
 
 _COPY_TARGET = (*[ctypes.c_uint] * 2, *[ctypes.c_int] * 7)
+
+
+def _add(numbers: dict[str, Number], more: dict[str, Number]) -> None:
+    """Add numbers to those of the same names."""
+    for name, number in more.items():
+        numbers[name] = numbers.get(name, type(number)()) + number

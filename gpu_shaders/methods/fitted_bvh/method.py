@@ -119,11 +119,7 @@ class FittedBvhMethod:
         camera = replace(request.camera, region=region).cropped()
         textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
         self._find(request, tree, camera, textures)
-        rows, columns = slice(region.y_min, region.y_max), slice(region.x_min, region.x_max)
-        for name in textures.passes:
-            getattr(surface, name)[rows, columns] = textures.read(name)
-        for times, more in ((surface.milliseconds, textures.milliseconds), (surface.counts, textures.counts)):
-            times |= {name: times.get(name, 0) + number for name, number in more.items()}
+        textures.read_into(surface, region)
 
     def _find_on_device(self, request: Request, tree: BuiltTree | None) -> SurfaceTextures:
         """On the context's thread."""

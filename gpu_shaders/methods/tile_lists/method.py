@@ -105,11 +105,7 @@ class TileLists:
         camera = replace(request.camera, region=region).cropped()
         textures = SurfaceTextures(self._context, (camera.width, camera.height), attributes)
         self._find(request, attributes, camera, textures)
-        rows, columns = slice(region.y_min, region.y_max), slice(region.x_min, region.x_max)
-        for name in textures.passes:
-            getattr(surface, name)[rows, columns] = textures.read(name)
-        for times, more in ((surface.milliseconds, textures.milliseconds), (surface.counts, textures.counts)):
-            times |= {name: times.get(name, 0) + number for name, number in more.items()}
+        textures.read_into(surface, region)
 
     def _find_on_device(self, request: Request) -> SurfaceTextures:
         """On the context's thread."""
