@@ -46,9 +46,9 @@ class _Order:
 
     balls: Balls
     field: Field
+    is_given_up: Event
+    tree: Future[BuiltTree]
     is_awaited: Event = dataclasses.field(default_factory=Event)
-    is_given_up: Event = dataclasses.field(default_factory=Event)
-    tree: Future[BuiltTree] = dataclasses.field(default_factory=Future)
 
     def is_of(self, balls: Balls, fluid_field: Field) -> bool:
         return self.balls is balls and self.field == fluid_field
@@ -118,8 +118,9 @@ class TreeBuilder:
             if order is None or not order.is_of(balls, fluid_field) or _has_failed(order):
                 if order is not None and not order.is_awaited.is_set():
                     order.is_given_up.set()
-                order = self._order = _Order(balls, fluid_field)
-                self._thread.submit(self._build, order, threads)
+                is_given_up = Event()
+                tree = self._thread.submit(self._build, balls, fluid_field, threads, is_given_up)
+                order = self._order = _Order(balls, fluid_field, is_given_up, tree)
             if is_awaited:
                 order.is_awaited.set()
             return order
@@ -131,18 +132,15 @@ class TreeBuilder:
             if order is not self._order:
                 order.is_given_up.set()
 
-    def _build(self, order: _Order, threads: int) -> None:
+    def _build(self, balls: Balls, fluid_field: Field, threads: int, is_given_up: Event) -> BuiltTree:
         def watch(_: float) -> None:
-            if order.is_given_up.is_set():
+            if is_given_up.is_set():
                 raise CancelledError("Newer balls are to be shown")
 
+        watch(0.0)
         start = time.perf_counter()
-        try:
-            watch(0.0)
-            tree = FittedBvh(order.balls, order.field, hierarchy=self._hierarchy, threads=threads, watch=watch)
-            order.tree.set_result(BuiltTree(order.balls, order.field, tree.arrays(), time.perf_counter() - start))
-        except BaseException as error:  # noqa: BLE001 - whoever waits for the tree gets it
-            order.tree.set_exception(error)
+        tree = FittedBvh(balls, fluid_field, hierarchy=self._hierarchy, threads=threads, watch=watch)
+        return BuiltTree(balls, fluid_field, tree.arrays(), time.perf_counter() - start)
 
 
 def _has_failed(order: _Order) -> bool:

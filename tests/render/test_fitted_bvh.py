@@ -183,8 +183,13 @@ def test_all_balls_at_one_point(use, with_storage):
 def test_the_tree_of_the_next_frame_is_made_ready(monkeypatch):
     """What was begun beforehand is used, and not built again."""
     scene, asked = SCENES["random_5000"](), []
-    begin = TREES._build
-    monkeypatch.setattr(TREES, "_build", lambda order, threads: (asked.append(order.balls), begin(order, threads)))
+    build = TREES._build
+
+    def note_and_build(balls, *further):
+        asked.append(balls)
+        return build(balls, *further)
+
+    monkeypatch.setattr(TREES, "_build", note_and_build)
     renderer.prepare(scene.balls, scene.field, "fitted_bvh", "auto")
     judge(image_of(scene, scene.camera("perspective")), scene, scene.camera("perspective"))
     assert [balls is scene.balls for balls in asked] == [True]
