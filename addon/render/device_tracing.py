@@ -12,7 +12,7 @@ from ..fluid.meshes import Meshes
 from ..fluid.tracing import Tracing
 from . import native
 from .registry import tracing_stage
-from .tracing import KEPT, SeenSurface, TracedScene, Watch, trace_image, triangle_tree
+from .tracing import KEPT, SeenSurface, TracedScene, Watch, trace_image, triangle_tree, world_image
 from .tree_builder import TREES
 from .vector_math import FloatArray
 
@@ -62,6 +62,6 @@ def _traced_meshes(stage: Any, meshes: Meshes, threads: int, watch: Watch) -> An
 
 
 def _irradiance(image: WorldImage) -> Any:
-    """What surfaces of each direction get of the world, see :meth:`stage.TracedLight.trace`."""
+    """What surfaces of each direction get of the world, see :meth:`stage.TracedLight.trace`; the same for the same image."""
     with native.translated_errors():
-        return native.load().WorldImage(np.ascontiguousarray(image.pixels)).irradiance()
+        return KEPT.made(image, "irradiance", lambda: world_image(image).irradiance())

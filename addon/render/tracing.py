@@ -29,7 +29,7 @@ Tracer = Callable[..., None]
 
 _UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-_MOSTKEPT = 16
+_MOST_KEPT = 16
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def trace_image(
             meshes=_mesh_arguments(core, scene, threads, watch),
             materials=material_tuples(scene.materials + (scene.meshes.materials if scene.meshes else ())),
             lights=light_tuples(lighting.lights),
-            distant=(lighting.world, *_world_arguments(core, lighting.image)),
+            distant=(lighting.world, *_world_arguments(lighting.image)),
             tracing=(
                 *(tracing.reflections, tracing.refractions, tracing.shadows),
                 *(tracing.occlusion_rays, tracing.occlusion_distance, tracing.samples),
@@ -146,7 +146,7 @@ def world_seen(camera: Camera, lighting: Lighting, threads: int = 0, watch: Watc
     """
     core = native.load()
     rgba = np.empty((camera.height, camera.width, 4), np.float32)
-    distant = lighting.world, *_world_arguments(core, lighting.image)
+    distant = lighting.world, *_world_arguments(lighting.image)
     with native.translated_errors():
         core.show_world(rgba, native.view_tuple(camera), distant=distant, threads=threads, watch=watch)
     return rgba
@@ -171,11 +171,15 @@ def triangle_tree(meshes: Meshes, threads: int, watch: Watch) -> Any:
     return KEPT.made(meshes, None, lambda: made(meshes.vertices, meshes.triangles, threads=threads, watch=watch))
 
 
-def _world_arguments(core: Any, image: WorldImage | None) -> tuple[Any, Any]:
+def world_image(image: WorldImage) -> Any:
+    """The native core's image of the world, which is kept as long as that lives."""
+    made = native.load().WorldImage
+    return KEPT.made(image, None, lambda: made(np.ascontiguousarray(image.pixels)))
+
+
+def _world_arguments(image: WorldImage | None) -> tuple[Any, Any]:
     """The image of the world, or None, and the rotation into its space."""
-    if image is None:
-        return None, _UPRIGHT
-    return KEPT.made(image, None, lambda: core.WorldImage(np.ascontiguousarray(image.pixels))), image.image_from_world
+    return (None, _UPRIGHT) if image is None else (world_image(image), image.image_from_world)
 
 
 class _Kept:
@@ -195,7 +199,7 @@ class _Kept:
         made = make()
         with self._lock:
             living = {key: kept for key, kept in self._made.items() if kept[0]() is not None}
-            self._made = dict(list(living.items())[1 - _MOSTKEPT :])
+            self._made = dict(list(living.items())[1 - _MOST_KEPT :])
             self._made[key] = weakref.ref(owner, lambda _: self._forget(key)), made
         return made
 

@@ -99,6 +99,7 @@ class TracedLight:
         self._fluid: TracedFluid | None = None
         self._buffers: TreeBuffers | None = None
         self._further: dict[str, BufferTexture | moderngl.Buffer] = {}
+        self._world: tuple[object, dict[str, moderngl.Texture]] = (None, {})
 
     def trace(
         self,
@@ -225,8 +226,12 @@ class TracedLight:
         return self._buffers
 
     def _world_textures(self, lighting: Lighting, irradiance: npt.NDArray[np.float32] | None) -> dict[str, moderngl.Texture]:
-        images = {"world_tx": lighting.image.pixels if lighting.image else None, "irradiance_tx": irradiance}
-        return {name: _image_texture(self._context, image) for name, image in images.items() if image is not None}
+        """The world's images, which stay while the same one is asked for."""
+        if self._world[0] is not lighting.image:
+            images = {"world_tx": lighting.image.pixels if lighting.image else None, "irradiance_tx": irradiance}
+            textures = {name: _image_texture(self._context, image) for name, image in images.items() if image is not None}
+            self._world = lighting.image, textures
+        return self._world[1]
 
     def _step_of(self, variant: Variant) -> Step | ComputeStep:
         if variant not in self._steps:
