@@ -26,7 +26,7 @@ from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
 from .pace import Pace
-from .renderer import prepare, render_to_show
+from .renderer import prepare, render_to_show, watch_of
 from .samples import sample_offset
 from .thickness import thickness_image
 
@@ -348,7 +348,7 @@ class LiveRenderer:
                     is_read_back=view.contrast_radius is not None,
                     backdrop=None
                     if view.surroundings is None
-                    else view.surroundings.backdrop(camera, view.threads, _watch(is_cancelled)),
+                    else view.surroundings.backdrop(camera, view.threads, watch_of(is_cancelled, None)),
                     sample=sample,
                 )
                 picture = _picture(image, view, is_hurried=look != view.look)
@@ -374,16 +374,6 @@ class LiveRenderer:
                 or not view.shows_the_same(live._view)
                 or any(other._stage() == 0 for other in self._views)
             )
-
-
-def _watch(is_cancelled: Callable[[], bool]) -> Callable[[float], None]:
-    """What native work calls."""
-
-    def watch(_share: float) -> None:
-        if is_cancelled():
-            raise CancelledError("The image is no longer wanted")
-
-    return watch
 
 
 def _picture(image: ImageBuffers | DeviceImage, view: View, is_hurried: bool) -> Picture:

@@ -13,6 +13,7 @@ from ..fluid.camera import Camera
 from ..fluid.lighting import FluidSource, Material
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import DEPTH_BACKGROUND, PASSES
+from ..fluid.tracing import Tracing
 from . import native
 from .depth_contrast import spatial_importance
 from .material_shading import shade_image
@@ -270,13 +271,13 @@ class PassImages:
             behind: Color | None = (0.0, 0.0, 0.0, 0.0)
         else:
             behind = self._behind.color_behind if self._is_alone else None
-        is_traced = uses_scene and self._look.tracing is not None
-        if behind is None or is_traced or not uses_scene:
+        tracing = self._look.tracing if uses_scene else None
+        if behind is None or tracing is not None or not uses_scene:
             rgba[:] = behind if self._behind is None else self._behind.rgba
         if not self._is_alone:
             rgba[self._is_before & ~shown] = 0
-        if is_traced:
-            self._trace(rgba)
+        if tracing is not None:
+            self._trace(rgba, tracing)
         elif uses_scene:
             self._shade_materials(rgba, behind)
         elif shown.any():
@@ -303,11 +304,8 @@ class PassImages:
             watch=request.watch,
         )
 
-    def _trace(self, rgba: FloatArray) -> None:
+    def _trace(self, rgba: FloatArray, tracing: Tracing) -> None:
         """Trace the light of fluid and meshes that show themselves."""
-        tracing = self._look.tracing
-        if tracing is None:
-            return
         request, surface, backdrop = self._request, self._surface, self._backdrop
         materials = tuple(source.material for source in self._sources)
         if request.balls.colors is None:
