@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from ..addon.fluid.errors import MeniscusError
@@ -23,11 +24,26 @@ WATER, WOOD, STONE, PAINT = (0.02, 0.25, 0.55), (0.35, 0.15, 0.05), (0.16, 0.16,
 
 def main(arguments: list[str] | None = None) -> int:
     """Make the picture; the exit status is 0 only if it was written."""
-    parser = argparse.ArgumentParser(description="Composite the dam break over a scene that Cycles renders.")
-    parser.add_argument("--output", default=str(PICTURE), metavar="FILE", help="out/composite.png beside the code if left out")
+    parser = picture_parser("Composite the dam break over a scene that Cycles renders.", PICTURE, samples=64)
+    return make_picture(parser.parse_args(arguments), furnish, render)
+
+
+def picture_parser(description: str, picture: Path, samples: int) -> argparse.ArgumentParser:
+    """The options of a picture of the dam break."""
+    parser = argparse.ArgumentParser(description=description)
+    place = f"out/{picture.name} beside the code if left out"
+    parser.add_argument("--output", default=str(picture), metavar="FILE", help=place)
     parser.add_argument("--frame", type=int, default=FRAME, help=f"{FRAME} if left out")
-    parser.add_argument("--samples", type=int, default=64, help="of Cycles, 64 if left out")
-    options = parser.parse_args(arguments)
+    parser.add_argument("--samples", type=int, default=samples, help=f"of each pixel, {samples} if left out")
+    return parser
+
+
+def make_picture(
+    options: argparse.Namespace,
+    furnish: Callable[[bpy.types.Scene], None],
+    render: Callable[[bpy.types.Scene, Path, int, int], None],
+) -> int:
+    """Bake the dam break where it was not before, furnish its scene and render it; the exit status."""
     try:
         scene_parts.new_scene()
         bpy.ops.wm.open_mainfile(filepath=str(dam_break.baked_file()))

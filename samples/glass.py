@@ -6,19 +6,14 @@ out/glass.png; ``blender --background --python`` does it in any Blender.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from ..addon.fluid.errors import MeniscusError
-from . import composite, dam_break, scene_parts
+from . import composite
 from .one_thread import bpy
 
 PICTURE = Path(__file__).resolve().parents[1] / "out" / "glass.png"
-FRAME = 26
-"""When the wave has hit the pillar."""
 
 ABSORBED, DENSITY = (0.25, 0.75, 0.85), 1.2
 """What a unit of water lets pass, and how much of it there is: red goes first."""
@@ -28,21 +23,8 @@ SKY, HORIZON, GROUND = (0.12, 0.28, 0.62), (0.85, 0.88, 0.92), (0.10, 0.09, 0.08
 
 def main(arguments: list[str] | None = None) -> int:
     """Make the picture; the exit status is 0 only if it was written."""
-    parser = argparse.ArgumentParser(description="Render the dam break as clear water with traced light.")
-    parser.add_argument("--output", default=str(PICTURE), metavar="FILE", help="out/glass.png beside the code if left out")
-    parser.add_argument("--frame", type=int, default=FRAME, help=f"{FRAME} if left out")
-    parser.add_argument("--samples", type=int, default=32, help="of each pixel, 32 if left out")
-    options = parser.parse_args(arguments)
-    try:
-        scene_parts.new_scene()
-        bpy.ops.wm.open_mainfile(filepath=str(dam_break.baked_file()))
-        furnish(bpy.context.scene)
-        render(bpy.context.scene, Path(options.output).absolute(), options.frame, options.samples)
-    except (MeniscusError, RuntimeError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    print(f"Wrote {options.output}")
-    return 0
+    parser = composite.picture_parser("Render the dam break as clear water with traced light.", PICTURE, samples=32)
+    return composite.make_picture(parser.parse_args(arguments), furnish, render)
 
 
 def furnish(scene: bpy.types.Scene) -> None:
