@@ -67,7 +67,11 @@ def test_fluid_casts_a_shadow_on_what_is_behind_it(scene, render):
     sun.rotation_euler = (np.pi / 2, 0, np.pi / 4)  # towards -x and +y
     lit = render()
     x = (np.arange(SIZE) + 0.5) / SIZE * 4 - 2
-    at = lambda place: int((place + 2) / 4 * SIZE)  # noqa: E731 - the pixel of a place
+
+    def at(place):
+        """Its pixel."""
+        return int((place + 2) / 4 * SIZE)
+
     row = lit[at(0.0)]
     assert row[at(-1.6), 0] < 0.01
     assert row[at(1.6), 0] == pytest.approx(0.8 * np.sqrt(0.5), rel=0.02)
