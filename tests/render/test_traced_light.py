@@ -47,12 +47,12 @@ class Traced:
     tracing: Tracing = field(default_factory=Tracing)
     is_film_clear: bool = False
 
-    def images(self, opengl, method="fitted_bvh", with_storage=False, projection="perspective"):
+    def images(self, opengl, method="fitted_bvh", with_storage=False, projection="perspective", light=None):
         """(height, width, 4) by the graphics processor and by the native core, and where there is a surface."""
         balls, camera = self.scene.balls, self.scene.camera(projection)
         request = Request(balls, camera, self.scene.field, frozenset({"color"}), 0, lambda _: None)
         surface = create_method(method)[1].find_surface_on_device(request)
-        light = TracedLight(opengl, with_storage)
+        light = light or TracedLight(opengl, with_storage)
         found = opengl.run(lambda: self._on_device(light, surface, camera))
         passes = surface.read_back()
         return found, self._on_cpu(passes, camera), passes["depth"] < 1e9
@@ -123,6 +123,18 @@ def test_an_image_of_the_world_and_rough_glass(opengl, with_storage):
     lighting = Lighting((LAMPS[0],), world.mean, world)
     traced = Traced(SCENES["ten_balls"](), (rough,), lighting, Tracing(samples=2, occlusion_rays=4))
     assert_same_picture(*traced.images(opengl, with_storage=with_storage), share=2e-3)
+
+
+@MEMORIES
+def test_another_image_of_the_world_is_another_light(opengl, with_storage):
+    """What is kept of one must not be shown for the next."""
+    light = TracedLight(opengl, with_storage)
+    for channel in range(3):
+        world = WorldImage(np.ascontiguousarray(np.broadcast_to(np.eye(3, dtype=np.float32)[channel], (4, 8, 3))))
+        traced = Traced(SCENES["ten_balls"](), (METAL,), Lighting((), world.mean, world))
+        found, wanted, hit = traced.images(opengl, with_storage=with_storage, light=light)
+        assert_same_picture(found, wanted, hit, share=0)
+        assert found[hit][:, channel].min() > 0.1
 
 
 @MEMORIES
