@@ -12,11 +12,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
+from typing import ParamSpec
 
 import build_extension
 import extension_wheels
@@ -28,13 +31,14 @@ from project import ROOT, ToolError, command_line
 from system_packages import ensure_test_programs
 
 REPORTS = ROOT / "out" / "reports"
+Parameters = ParamSpec("Parameters")
 SUITES_AT_ONCE = 2
 """Of pytest, without a window, that run beside one another; each takes little more than one processor."""
 
 
 @dataclass
 class Result:
-    """How one suite went; a problem is a sentence, empty when all is well."""
+    """How one suite went and how long it took; a problem is a sentence, empty when all is well."""
 
     name: str
     passed: int = 0
@@ -42,6 +46,7 @@ class Result:
     skipped: int = 0
     problem: str = ""
     is_missing: bool = False
+    seconds: float = 0.0
 
 
 def run_all() -> list[Result]:
@@ -69,11 +74,25 @@ def run_fast() -> list[Result]:
     return [*results, native_suite(native_tests.stable_suites()[0])]
 
 
+def timed(suite: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Have the result say how long the suite took."""
+
+    @wraps(suite)
+    def run(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        start = time.monotonic()
+        result = suite(*args, **kwargs)
+        result.seconds = time.monotonic() - start
+        return result
+
+    return run
+
+
 def build_after(wheels: Future[list[Path]]) -> None:
     wheels.result()
     build_extension.build()
 
 
+@timed
 def check(name: str, action: Callable[[], object]) -> Result:
     """Run a check that has no tests to count."""
     announce(name)
@@ -101,6 +120,7 @@ def host_suite(name: str, setup: Future[None]) -> Result:
     return run_suite(name, f"Blender tests: {name}", command)
 
 
+@timed
 def run_suite(name: str, title: str, command: list[str]) -> Result:
     """Run a suite that writes a report; what it says is shown in one piece, because another may run beside it."""
     done = subprocess.run(
@@ -117,6 +137,7 @@ def run_suite(name: str, title: str, command: list[str]) -> Result:
     return result_of(name, done.returncode)
 
 
+@timed
 def window_suite(name: str, setup: Future[None]) -> Result:
     """Run the suite of a window, once its host is set up; alone, for it watches how what is drawn follows in time."""
     announce(f"Blender tests: {name}")
@@ -132,6 +153,7 @@ def window_suite(name: str, setup: Future[None]) -> Result:
     return result_of(name, status)
 
 
+@timed
 def native_suite(name: str, toolchain: Future[dict[str, str]] | None = None) -> Result:
     """Run tests of native/, once the toolchain is there."""
     announce(name)
@@ -190,7 +212,7 @@ def summarise(results: list[Result]) -> int:
     """Print the table, the hosts that are missing in a box, and one closing line; the exit status."""
     announce("summary")
     for result in results:
-        counts = f"{result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped"
+        counts = f"{result.passed:>5} passed {result.failed:>4} failed {result.skipped:>4} skipped {result.seconds:>5.0f} s"
         print(f"{result.name:<18} {counts}  {result.problem}")
     missing = [result for result in results if result.is_missing]
     if missing:

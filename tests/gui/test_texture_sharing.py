@@ -198,12 +198,15 @@ def test_the_picture_is_the_one_that_is_read_back_and_meshes_hide_and_are_hidden
 def test_sharing_leaves_nothing_behind(drawing):
     redraw(10)
     assert set(drawing.kinds) == {"DeviceImage"}
-    before = resident_megabytes()
-    redraw(200)
+    resident = [resident_megabytes()]
+    for _ in range(4):
+        redraw(50)
+        resident.append(resident_megabytes())
     assert len(drawing.textures) >= 200
     # Blender keeps some textures for later use.
     assert max(drawing.textures[-100:]) <= max(drawing.textures[5:100])
-    assert resident_megabytes() - before < 8
+    # What is made once and kept, by the driver or by malloc, grows in some stretch; what is lost grows in each.
+    assert min(np.diff(resident)) < 1
 
 
 def test_sharing_can_end_and_begin_again(drawing):
