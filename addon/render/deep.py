@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..fluid.image import ImageBuffers
 from ..fluid.look import Look
 from .method import timed
 from .renderer import render, watch_of
+from .settings import Value
 from .spans import Spans, find_spans
 from .surroundings import Backdrop
 
@@ -31,6 +32,7 @@ def render_deep(
     on_progress: Callable[[float], None] | None = None,
     threads: int = 0,
     backdrop: Backdrop | None = None,
+    settings: Mapping[str, Value] | None = None,
 ) -> DeepImage:
     """Render the inside of a fluid along the rays through the centres of the pixels.
 
@@ -45,7 +47,8 @@ def render_deep(
     """
     hiding = None if backdrop is None else _colorless(backdrop, camera)
     image = render(
-        balls, camera, field, method, backend, ("combined", "depth"), look, is_cancelled, on_progress, threads, hiding
+        *(balls, camera, field, method, backend, ("combined", "depth"), look, is_cancelled, on_progress, threads, hiding),
+        settings=settings,
     )
     region = camera.cropped()
     with timed(image.info.milliseconds, "spans"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
@@ -17,6 +17,7 @@ from ..fluid.camera import Camera
 from ..fluid.field import Field
 from ..fluid.passes import DEPTH_BACKGROUND
 from .image_memory import ImageMemory
+from .settings import Setting, Value
 
 Backend = Literal["gpu", "cpu"]
 Attribute = Literal["color", "velocity", "ball"]
@@ -39,6 +40,8 @@ class MethodInfo:
         What it finds beside depth and normal.
     gl_version
         Least OpenGL version as moderngl writes it (330), 0 on the CPU.
+    settings
+        What users can set of it.
     """
 
     name: str
@@ -47,6 +50,7 @@ class MethodInfo:
     backend: Backend
     attributes: frozenset[Attribute]
     gl_version: int = 0
+    settings: tuple[Setting, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ class Request:
         To be called often with the share of the work that is done, 0 to 1; raises CancelledError when the user gave up.
     memory
         Where images come from.
+    settings
+        All settings of the method by name, checked, see :class:`settings.Setting`.
     """
 
     balls: Balls
@@ -74,6 +80,7 @@ class Request:
     threads: int
     watch: Callable[[float], None]
     memory: ImageMemory = dataclasses.field(default_factory=ImageMemory)
+    settings: Mapping[str, Value] = dataclasses.field(default_factory=dict)
 
     @property
     def known_attributes(self) -> tuple[Attribute, ...]:

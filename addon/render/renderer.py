@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -34,6 +34,7 @@ from .method import (
 )
 from .pass_images import NEEDED, PassImages, needed_attributes
 from .registry import create_method, method_infos, runs_in_software_opengl
+from .settings import Value, checked_settings
 from .surroundings import Backdrop, Motion
 from .tracing import Tracer, trace_image
 
@@ -57,6 +58,7 @@ def render(
     motion: Motion | None = None,
     memory: ImageMemory | None = None,
     sample: int = 0,
+    settings: Mapping[str, Value] | None = None,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -85,6 +87,8 @@ def render(
     sample
         How many images of this view were made before: traced light has other samples in each, so that their mean has less
         noise.
+    settings
+        Of the method that is named, by their names, see :class:`method.MethodInfo`; what is left out has its default.
 
     Returns
     -------
@@ -95,7 +99,7 @@ def render(
     InputError, DeviceError, CancelledError
         Each with one sentence for the user.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings)
     request = shot.request if memory is None else replace(shot.request, memory=memory)
     shot = replace(shot, request=request, backdrop=backdrop, motion=motion, sample=sample)
     return shot.image(shot.choice.runner.find_surface(shot.request))
@@ -112,6 +116,7 @@ def render_progressively(
     is_cancelled: Callable[[], bool] | None = None,
     on_progress: Callable[[float], None] | None = None,
     threads: int = 0,
+    settings: Mapping[str, Value] | None = None,
 ) -> Iterator[ImageBuffers]:
     """Render the surface of a fluid from coarse to fine.
 
@@ -122,7 +127,7 @@ def render_progressively(
     ImageBuffers of the whole image, each finer than the one before; the last is what :func:`render` returns. A method that
     cannot do so yields that one only.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings)
     runner = shot.choice.runner
     if isinstance(runner, ProgressiveMethod):
         yield from map(shot.image, runner.find_surfaces(shot.request))
@@ -143,6 +148,7 @@ def render_to_show(
     is_read_back: bool = False,
     backdrop: Backdrop | None = None,
     sample: int = 0,
+    settings: Mapping[str, Value] | None = None,
 ) -> ImageBuffers | DeviceImage:
     """Render the surface of a fluid for Blender to draw.
 
@@ -153,7 +159,7 @@ def render_to_show(
     A DeviceImage where the method runs on an OpenGL that shares its textures with Blender's and the passes can stay there, else
     ImageBuffers.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads, settings)
     shot = replace(shot, backdrop=backdrop, sample=sample)
     runner = shot.choice.runner
     can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
@@ -199,6 +205,7 @@ class _Shot:
         is_cancelled: Callable[[], bool] | None,
         on_progress: Callable[[float], None] | None,
         threads: int,
+        settings: Mapping[str, Value] | None,
     ) -> _Shot:
         names = checked_passes(passes)
         if threads < 0:
@@ -208,8 +215,9 @@ class _Shot:
         if any(source.is_holdout for source in look.sources):
             attributes |= {NEEDED["object_index"]}
         choice = _pick_method(method, backend, attributes)
+        checked = _settings_of(choice.info, method, settings)
         watch = watch_of(is_cancelled, on_progress)
-        request = Request(balls, camera.cropped(), field, attributes, threads, watch)
+        request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked)
         return cls(choice, request, camera, names, look)
 
     @property
@@ -254,6 +262,12 @@ class _Choice:
         """What traces light: the graphics processor where the method runs on one, else the native core."""
         is_hardware = self.info.backend == "gpu" and not runs_in_software_opengl(self.info)
         return trace_image_on_device if is_hardware else trace_image
+
+
+def _settings_of(info: MethodInfo, method: str, settings: Mapping[str, Value] | None) -> dict[str, Value]:
+    if method == "auto" and settings:
+        raise InputError("Settings belong to one method, and the method is automatic: choose the method too, or leave them out")
+    return checked_settings(f"The method '{info.name}'", info.settings, settings)
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
