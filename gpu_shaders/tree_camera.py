@@ -20,7 +20,7 @@ def tree_camera_uniforms(tree: TreeArrays, camera: Camera, field: Field) -> dict
     anchor = camera.eye + depth * forward - tree.origin
     return {
         **camera_uniforms(camera),
-        "isovalue": field.isovalue,
+        "isovalue": field.threshold,
         "anchor": tuple(anchor.tolist()),
         "anchor_depth": depth,
         "clip_depths": (camera.clip_start - depth, camera.clip_end - depth),

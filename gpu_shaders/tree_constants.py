@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..addon.fluid.kernels import Kernel
+from ..addon.fluid.kernels import PolynomialKernel
 from .kernel_constants import kernel_constants
 
 GREATEST_DEPTH = 96
@@ -35,7 +35,7 @@ class TreeVariant:
     with_weights: bool = False
     overlaps: bool = False
 
-    def constants(self, kernel: Kernel) -> dict[str, object]:
+    def constants(self, kernel: PolynomialKernel) -> dict[str, object]:
         """The constants by name."""
         return {
             **kernel_constants(kernel),

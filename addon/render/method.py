@@ -42,6 +42,8 @@ class MethodInfo:
         Least OpenGL version as moderngl writes it (330), 0 on the CPU.
     settings
         What users can set of it.
+    any_kernel
+        Whether it takes kernels that are no polynomials.
     """
 
     name: str
@@ -51,6 +53,7 @@ class MethodInfo:
     attributes: frozenset[Attribute]
     gl_version: int = 0
     settings: tuple[Setting, ...] = ()
+    any_kernel: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ def load() -> Any:
 
 
 def fluid_arguments(balls: Balls, field: Field) -> tuple[Any, ...]:
-    """The first arguments of the module's functions and classes."""
-    return balls.positions, balls.radii, balls.weights, field.density_kernel.coefficients, field.isovalue
+    """The first arguments of the module's functions and classes; InputError where the kernel is no polynomial."""
+    return balls.positions, balls.radii, balls.weights, field.polynomial_kernel.coefficients, field.threshold
 
 
 def view_arguments(camera: Camera) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from ..fluid.camera import Camera
 from ..fluid.errors import CancelledError, DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
-from ..fluid.look import Look
+from ..fluid.kernels import PolynomialKernel
+from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES, checked_passes
 from .device_image import DeviceImage
 from .device_tracing import trace_image_on_device
@@ -174,7 +175,7 @@ def prepare(balls: Balls, field: Field, method: str, backend: str, threads: int 
     The parameters are those of :func:`render`. Nothing happens where the method cannot run: rendering tells why.
     """
     with suppress(MeniscusError):
-        runner = _pick_method(method, backend, frozenset()).runner
+        runner = _pick_method(method, backend, frozenset(), field).runner
         if isinstance(runner, PreparingMethod):
             runner.prepare(balls, field, threads)
 
@@ -214,7 +215,10 @@ class _Shot:
         attributes = needed_attributes(names, look)
         if any(source.is_holdout for source in look.sources):
             attributes |= {NEEDED["object_index"]}
-        choice = _pick_method(method, backend, attributes)
+        traces = look.tracing is not None and LOOK_STYLES[look.style].uses_scene and "combined" in names
+        if traces or "thickness" in names:
+            _ = field.polynomial_kernel  # tells now what it would tell after the surface is found
+        choice = _pick_method(method, backend, attributes, field)
         checked = _settings_of(choice.info, method, settings)
         watch = watch_of(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked)
@@ -270,17 +274,20 @@ def _settings_of(info: MethodInfo, method: str, settings: Mapping[str, Value] | 
     return checked_settings(f"The method '{info.name}'", info.settings, settings)
 
 
-def _pick_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
-    """The method asked for, or the fastest one that runs here on the back-end asked for and finds these attributes."""
+def _pick_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field) -> _Choice:
+    """The method asked for, or the fastest one that runs here on the back-end asked for, finds these attributes and takes the
+    field's kernel.
+    """
     if backend not in BACKENDS:
         raise InputError(f"Unknown back-end '{backend}': choose one of {', '.join(BACKENDS)}")
     if method != "auto":
-        return _named_method(method, backend, attributes)
+        return _named_method(method, backend, attributes, field)
     problems: list[MeniscusError] = []
     for info in _preferred(backend):
         try:
             if missing := _passes_without(attributes - info.attributes):
                 raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
+            _check_kernel(info, field)
             reason = str(problems[0]) if problems else "The fastest method, and it runs here"
             return _Choice(*create_method(info.name), reason)
         except (DeviceError, InputError) as error:
@@ -301,13 +308,22 @@ def _runs_in_software(info: MethodInfo) -> bool:
         return False
 
 
-def _named_method(method: str, backend: str, attributes: frozenset[Attribute]) -> _Choice:
+def _named_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field) -> _Choice:
     info, runner = create_method(method)
     if backend not in ("auto", info.backend):
         raise InputError(f"The method '{method}' runs on the back-end '{info.backend}', not on '{backend}'")
     if missing := _passes_without(attributes - info.attributes):
         raise InputError(f"The method '{method}' cannot make the pass {missing}; choose another method")
+    _check_kernel(info, field)
     return _Choice(info, runner, "Chosen in the settings")
+
+
+def _check_kernel(info: MethodInfo, field: Field) -> None:
+    kernel = field.density_kernel
+    if not (info.any_kernel or isinstance(kernel, PolynomialKernel)):
+        others = [f"the method {other.label}" for other in method_infos() if other.any_kernel]
+        choices = ", ".join([*others, "another kernel"])
+        raise InputError(f"{info.label} cannot draw the kernel {kernel.label}, which is no polynomial; choose {choices}")
 
 
 def _passes_without(missing: frozenset[Attribute]) -> str:

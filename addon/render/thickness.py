@@ -6,7 +6,6 @@ summed at a low resolution and blurred as wide as the balls are, so that no sing
 
 from __future__ import annotations
 
-import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy.typing as npt
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.field import Field
-from ..fluid.kernels import KERNELS, Kernel
+from ..fluid.kernels import Kernel
 from ..fluid.turning import turned
 from .depth_contrast import blurred_rows
 
@@ -78,7 +77,7 @@ def typical_density(balls: Balls, field: Field) -> float:
     """Density inside the fluid: the median of those at the centres of some balls."""
     known = _densities.setdefault(balls, {})
     if field not in known:
-        known[field] = _median_density(balls, KERNELS[field.kernel])
+        known[field] = _median_density(balls, field.density_kernel)
     return known[field]
 
 
@@ -99,15 +98,8 @@ def _density_at(point: npt.NDArray[np.float64], balls: Balls, kernel: Kernel) ->
 
 def _volumes(balls: Balls, field: Field) -> FloatArray:
     """(count,): of the fluid that each ball stands for; balls that carve take some away."""
-    content = _content(KERNELS[field.kernel]) / typical_density(balls, field)
+    content = field.density_kernel.content / typical_density(balls, field)
     return np.asarray(content * balls.weights * balls.radii**3, np.float32)
-
-
-def _content(kernel: Kernel) -> float:
-    """The integral of a kernel over its ball of radius 1."""
-    # In spherical coordinates each power is a beta function.
-    powers = (0.5 * math.gamma(1.5) * math.gamma(k + 1) / math.gamma(k + 2.5) for k in range(len(kernel.coefficients)))
-    return 4 * math.pi * sum(c * power for c, power in zip(kernel.coefficients, powers, strict=True))
 
 
 def _coarse(camera: Camera) -> Camera:

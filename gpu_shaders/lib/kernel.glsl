@@ -1,6 +1,10 @@
-// The density kernels, and their polynomials over an interval of a ray in Bernstein form.
-// f(x) = x^KERNEL_POWER (KERNEL_LOW + KERNEL_HIGH x); KERNEL_DEGREE: 2, 4, 6 or 8, its degree along a ray.
+// The density kernels; of those that are polynomials also how fast their slopes change, and the polynomials over an interval of a
+// ray in Bernstein form.
+// With KERNEL_IS_POLYNOMIAL f(x) = x^KERNEL_POWER (KERNEL_LOW + KERNEL_HIGH x); KERNEL_DEGREE: 2, 4, 6 or 8, its degree along a
+// ray. Else f(x) = (1 - s)^2 with s = sqrt(1 - x) (Mishima et al. 2008, equation 7).
 #include "lib/chord.glsl"
+
+#if KERNEL_IS_POLYNOMIAL
 
 float kernel_power(float x) {
     float result = x;
@@ -100,3 +104,19 @@ void kernel_add_bernstein(inout float total[KERNEL_DEGREE + 1], Chord chord, flo
 #endif
 #endif
 }
+
+#else
+
+float kernel_value(float x) {
+    // 1 - s without cancellation.
+    float root = max(x, 0.0) / (1.0 + sqrt(max(1.0 - x, 0.0)));
+    return root * root;
+}
+
+// Towards the centre the slope by x grows without bound, but not that by s, which is what a gradient has.
+float kernel_derivative(float x) {
+    float s = max(sqrt(max(1.0 - x, 0.0)), KERNEL_LEAST_SHARE);
+    return x <= 0.0 ? 0.0 : x / ((1.0 + s) * s);
+}
+
+#endif

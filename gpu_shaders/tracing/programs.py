@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
-from ...addon.fluid.kernels import KERNELS, Kernel
+from ...addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ...addon.fluid.passes import DEPTH_BACKGROUND
 from ..programs import ProgramSource
 from ..tree_constants import TreeVariant
@@ -36,7 +36,7 @@ class Variant:
         Whether there are triangles.
     """
 
-    kernel: Kernel
+    kernel: PolynomialKernel
     tree: TreeVariant
     with_colors: bool = False
     with_sources: bool = False
@@ -68,7 +68,7 @@ class Variant:
 def all_programs() -> Iterator[ProgramSource]:
     """Every program under every constant that it may be compiled with, though not under all combinations of them."""
     for storage in (False, True):
-        for kernel, weights in product(KERNELS.values(), (False, True)):
+        for kernel, weights in product(POLYNOMIAL_KERNELS.values(), (False, True)):
             yield Variant(kernel, TreeVariant(storage, weights)).program()
         for flags in product((False, True), repeat=5):
-            yield Variant(KERNELS["wyvill"], TreeVariant(storage), *flags).program()
+            yield Variant(POLYNOMIAL_KERNELS["wyvill"], TreeVariant(storage), *flags).program()

@@ -137,7 +137,7 @@ class TracedLight:
         lets_pass = any(material.transmission > 0 and material.metallic < 1 for material in materials)
         with_image = lighting.image is not None and irradiance is not None
         variant = Variant(
-            fluid.field.density_kernel,
+            fluid.field.polynomial_kernel,
             buffers.variant,
             balls.colors is not None,
             balls.sources is not None,

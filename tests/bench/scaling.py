@@ -16,7 +16,7 @@ import numpy as np
 
 import meniscus
 from meniscus.addon.fluid.errors import MeniscusError
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method, gpu, method_infos
 
@@ -73,7 +73,7 @@ def cases(most_balls: int, size: tuple[int, int]) -> Iterator[Case]:
     sizes = ((320, 240), (640, 480), (1280, 720), (1920, 1080), (3840, 2160))
     yield from (Case("resolution", size=other) for other in sizes if other[0] <= 2 * size[0])
     yield from (Case("density", crossings=crossings, size=size) for crossings in (2, 5, 10, 20, 40))
-    yield from (Case("kernel", kernel=kernel, size=size) for kernel in KERNELS)
+    yield from (Case("kernel", kernel=kernel, size=size) for kernel in POLYNOMIAL_KERNELS)
 
 
 def main(arguments: list[str] | None = None) -> None:

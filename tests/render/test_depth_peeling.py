@@ -13,7 +13,7 @@ from scenes import SCENES, Scene
 import meniscus
 from meniscus.addon.fluid.camera import Region
 from meniscus.addon.fluid.errors import DeviceError
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 from meniscus.gpu_shaders.capture import Capture
 from meniscus.gpu_shaders.methods.depth_peeling import groups, targets
 from meniscus.gpu_shaders.methods.depth_peeling.options import Options
@@ -75,7 +75,7 @@ def test_each_optimisation_spares_work(depth_peeling, monkeypatch):
     assert best["bezier_iterations_max"] < 15
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 @pytest.mark.parametrize("scene_name", ["ten_balls", "negative_weights", "eye_inside_fluid"])
 def test_rays_whose_lists_are_too_short_arrive_all_the_same(scene_name, kernel, depth_peeling):
     scene = replace(SCENES[scene_name](), field=meniscus.Field(kernel, 0.25))

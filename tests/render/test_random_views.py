@@ -10,7 +10,7 @@ from judge import judge
 from scenes import Scene
 
 import meniscus
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 from meniscus.addon.render.registry import method_infos
 
 
@@ -26,7 +26,7 @@ def random_scene(seed):
         eye=tuple(random.uniform(-1.5, 1.5, 3)),
         target=tuple(random.uniform(-1.5, 1.5, 3)),
         view_height=float(random.uniform(0.3, 2)),
-        field=meniscus.Field(str(random.choice(list(KERNELS))), float(random.uniform(0.1, 0.6))),
+        field=meniscus.Field(str(random.choice(list(POLYNOMIAL_KERNELS))), float(random.uniform(0.1, 0.6))),
     )
 
 

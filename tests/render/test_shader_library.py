@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import KERNELS, POLYNOMIAL_KERNELS
 from meniscus.gpu_shaders.glsl import Source
 from meniscus.gpu_shaders.kernel_constants import kernel_constants
 
@@ -35,9 +35,9 @@ def run_on_rows(context, library, constants, body, rows):
 
 
 @pytest.mark.parametrize("stack", [0, 1, 3])
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 def test_bezier_clipping_finds_the_first_root(opengl, kernel, stack):
-    constants = {**kernel_constants(KERNELS[kernel]), "BEZIER_STACK": stack, "DIAGNOSTICS": 0}
+    constants = {**kernel_constants(POLYNOMIAL_KERNELS[kernel]), "BEZIER_STACK": stack, "DIAGNOSTICS": 0}
     degree = constants["KERNEL_DEGREE"]
     polynomials = np.random.default_rng(degree).normal(size=(20000, degree + 1)).astype(np.float32)
     values = ", ".join(f"in_{index}" for index in range(degree + 1))
@@ -50,9 +50,9 @@ def test_bezier_clipping_finds_the_first_root(opengl, kernel, stack):
     assert 0.1 < np.mean(found & (roots > 0)) < 0.9
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 def test_interval_polynomial_is_the_kernel_along_the_ray(opengl, kernel):
-    constants = {**kernel_constants(KERNELS[kernel]), "BALL_TEXTURE_WIDTH": 1}
+    constants = {**kernel_constants(POLYNOMIAL_KERNELS[kernel]), "BALL_TEXTURE_WIDTH": 1}
     generator = np.random.default_rng(3)
     peak, middle, radius = generator.uniform(0.1, 1, 500), generator.uniform(2, 4, 500), generator.uniform(0.2, 2, 500)
     half = radius * np.sqrt(peak)
@@ -67,7 +67,7 @@ def test_interval_polynomial_is_the_kernel_along_the_ray(opengl, kernel):
         coefficient = run_on_rows(opengl, "lib/kernel.glsl", constants, body, rows)
         at_begin, at_end = (begin - middle) / radius, (end - middle) / radius
         x = np.stack([peak - at_begin**2, peak - at_begin * at_end, peak - at_end**2])
-        np.testing.assert_allclose(coefficient, 1.5 * bernstein.compose(KERNELS[kernel], x)[index], atol=1e-5)
+        np.testing.assert_allclose(coefficient, 1.5 * bernstein.compose(POLYNOMIAL_KERNELS[kernel], x)[index], atol=1e-5)
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -76,7 +76,7 @@ def test_kernel_value_and_derivative(opengl, kernel):
     x = np.linspace(-0.5, 1, 301)
     for function, expected in (("value", KERNELS[kernel].value(x)), ("derivative", KERNELS[kernel].derivative(x))):
         result = run_on_rows(opengl, "lib/kernel.glsl", constants, f"result = kernel_{function}(in_0);", x[:, None])
-        np.testing.assert_allclose(result, expected, atol=2e-6)
+        np.testing.assert_allclose(result, expected, rtol=1e-6, atol=2e-6)
 
 
 def test_depth_textures_keep_every_digit_of_a_float(opengl):

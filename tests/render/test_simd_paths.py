@@ -17,7 +17,7 @@ from scenes import HEIGHT, SCENES, WIDTH
 
 import meniscus
 from meniscus.addon.fluid.image import RenderInfo
-from meniscus.addon.fluid.kernels import KERNELS, Kernel
+from meniscus.addon.fluid.kernels import KERNELS, PolynomialKernel
 
 PATHS: list[str] = meniscus_native.simd_paths()
 SCRIPT = Path(__file__).with_name("path_images.py")
@@ -92,7 +92,7 @@ def test_threads_and_repetition_change_no_bit():
 
 @pytest.mark.parametrize("coefficients", [(0.0, 0.5, 0.0, 0.0, 0.5), (0.0, 0.1, 0.9), (0.0, 0.05, 0.05, 0.0, 0.9)])
 def test_kernels_with_a_linear_and_a_steeper_term(monkeypatch, coefficients):
-    monkeypatch.setitem(KERNELS, "mixed", Kernel("mixed", "Mixed", "", coefficients))
+    monkeypatch.setitem(KERNELS, "mixed", PolynomialKernel("mixed", "Mixed", "", coefficients))
     scene = replace(SCENES["ten_balls"](), field=meniscus.Field("mixed", 0.25))
     for projection in PROJECTIONS:
         camera = scene.camera(projection)

@@ -10,7 +10,7 @@ from render.scenes import SCENES, Scene
 
 import meniscus
 from meniscus.addon.fluid.errors import InputError
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 from meniscus.addon.render.native import load
 
 # A ray whose density has an extremum this close to the isovalue cannot be decided in single precision.
@@ -117,7 +117,7 @@ def scene_of_any_sort(random):
     if random.random() < 0.3:
         positions, radii = np.round(positions * 8) / 8, np.maximum(np.round(radii * 8) / 8, 0.125)
     shift = random.choice([0, 0, 0, 1e3, 1e5]) * random.normal(size=3)
-    field = meniscus.Field(str(random.choice(list(KERNELS))), float(10 ** random.uniform(-1.5, 0.5)))
+    field = meniscus.Field(str(random.choice(list(POLYNOMIAL_KERNELS))), float(10 ** random.uniform(-1.5, 0.5)))
     return Scene(meniscus.Balls(positions + shift, radii, weights), field=field)
 
 
@@ -174,7 +174,7 @@ def test_a_pocket_in_the_fluid_is_not_taken_for_fluid():
     axis = np.arange(-10.0, 11.0)
     balls = meniscus.Balls(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3), 1.0)
     corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    least = KERNELS["quartic"].value(1 - (corner**2).sum(1)).sum()
+    least = POLYNOMIAL_KERNELS["quartic"].value(1 - (corner**2).sum(1)).sum()
     random = np.random.default_rng(10)
     origins = np.floor(random.uniform(-5, 5, (2000, 3))) + 0.5 + random.normal(0, 0.1, (2000, 3))
     directions = random.normal(size=(2000, 3))

@@ -9,7 +9,9 @@ import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.fluid.kernels import KERNELS
 from meniscus.addon.fluid.passes import checked_passes
+from meniscus.addon.render import native
 
+BALL = meniscus.Balls([[0, 0, 0]], 1.0)
 X = np.linspace(0, 1, 1001)
 PRINTED = {
     # In s = r / R, as the papers print them.
@@ -18,11 +20,12 @@ PRINTED = {
     "poly6": lambda s: (1 - s**2) ** 3,
     "power_4": lambda s: (1 - s**2) ** 4,
     "power_1": lambda s: 1 - s**2,
+    "mishima": lambda s: (1 - s) ** 2,
 }
 
 
 @pytest.mark.parametrize("name", KERNELS)
-def test_kernel_is_the_printed_polynomial(name):
+def test_kernel_is_the_printed_one(name):
     s = np.sqrt(1 - X)
     np.testing.assert_allclose(KERNELS[name].value(X), PRINTED[name](s), atol=1e-14)
 
@@ -53,6 +56,38 @@ def test_kernel_radius_is_where_a_lone_ball_has_the_isovalue():
     density = weights * (1 - (kernel_radii / radii) ** 2) ** 3
     np.testing.assert_allclose(density[:2], 0.3)
     assert np.all(kernel_radii[2:] == 0)
+
+
+def test_the_surface_of_mishimas_kernel_is_where_the_root_of_the_sum_is_the_isovalue():
+    # Mishima et al. 2008, section 6: h = 0.61, T = 0.765625; alone a ball has the radius h (1 - T).
+    field = meniscus.Field("mishima", 0.765625)
+    assert field.threshold == 0.765625**2
+    assert field.kernel_radii(np.array([0.61]), np.ones(1))[0] == pytest.approx(0.61 * (1 - 0.765625))
+    assert field.kernel_radii(np.array([0.61]), np.array([4.0]))[0] == pytest.approx(0.61 * (1 - 0.765625 / 2))
+
+
+def test_the_slope_of_mishimas_kernel_has_a_limit_at_the_centre_by_distance_only():
+    kernel = KERNELS["mishima"]
+    s = np.geomspace(1e-3, 0.5, 50)
+    np.testing.assert_allclose(2 * s * kernel.derivative(1 - s**2), 2 * (1 - s), rtol=1e-9)
+    assert 1000 < kernel.derivative(np.float64(1)) < np.inf
+    # The gradient, which has the distance as a factor, never exceeds the limit.
+    nearest = np.linspace(0, 1e-3, 1001)
+    assert np.all(2 * nearest * kernel.derivative(1 - nearest**2) <= 2.0)
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_steepest_slope_is_that_of_the_kernel_by_distance(name):
+    s = np.linspace(0, 1, 20_001)
+    steps = np.abs(np.diff(KERNELS[name].value(1 - s**2))) / np.diff(s)
+    assert np.max(steps) <= KERNELS[name].steepest_slope * (1 + 1e-6)
+    assert np.max(steps) == pytest.approx(KERNELS[name].steepest_slope, rel=1e-3)
+
+
+@pytest.mark.parametrize("use", [lambda field: native.fluid_arguments(BALL, field), lambda field: field.polynomial_kernel])
+def test_a_kernel_that_is_no_polynomial_is_refused_where_one_is_needed(use):
+    with pytest.raises(InputError, match="Mishima is no polynomial"):
+        use(meniscus.Field("mishima", 0.7))
 
 
 def test_balls_repeat_single_values():

@@ -11,7 +11,7 @@ import pytest
 
 import meniscus
 from meniscus.addon.fluid.errors import InputError
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 
 ALONG_Y = [[0.0, 1.0, 0.0]]
 
@@ -21,7 +21,7 @@ def cast_one(balls, field, origin, direction=ALONG_Y[0]):
     return t[0], normals[0]
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 def test_one_ball_is_its_kernel_sphere(kernel):
     field = meniscus.Field(kernel, 0.3)
     balls = meniscus.Balls([[0, 0, 0]], 2.0)
@@ -99,7 +99,7 @@ def test_directions_need_not_be_unit():
     assert cast_one(balls, field, (0, -4, 0), (0, 50, 0))[0] == pytest.approx(cast_one(balls, field, (0, -4, 0))[0], abs=1e-12)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 def test_density_at_the_hit_is_the_isovalue_and_less_before(kernel):
     generator = np.random.default_rng(11)
     balls = meniscus.Balls(generator.random((300, 3)), generator.uniform(0.1, 0.3, 300), generator.uniform(0.5, 1.5, 300))
@@ -113,7 +113,7 @@ def test_density_at_the_hit_is_the_isovalue_and_less_before(kernel):
     def density(distance):
         points = origins[hit] + distance[:, None] * directions
         x = 1 - ((points[:, None] - balls.positions) ** 2).sum(-1) / balls.radii.astype(float) ** 2
-        return (balls.weights * KERNELS[kernel].value(x)).sum(1)
+        return (balls.weights * POLYNOMIAL_KERNELS[kernel].value(x)).sum(1)
 
     np.testing.assert_allclose(density(t[hit]), 0.4, atol=1e-10)
     for share in np.linspace(0.5, 0.999, 200):
@@ -140,7 +140,7 @@ def test_a_ball_that_carves_makes_a_hollow():
     np.testing.assert_array_equal(is_entering, [True, False, True, False])
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("kernel", POLYNOMIAL_KERNELS)
 def test_a_place_is_in_the_fluid_after_an_odd_number_of_crossings_on_the_way(kernel):
     generator = np.random.default_rng(12)
     weights = generator.uniform(0.5, 1.5, 40) * generator.choice([1, 1, 1, -1], 40)
@@ -152,7 +152,7 @@ def test_a_place_is_in_the_fluid_after_an_odd_number_of_crossings_on_the_way(ker
     on_the_way = t < np.linalg.norm(places - origins, axis=1)[rays]
     is_inside = np.bincount(rays[on_the_way], minlength=20000) % 2 == 1
     x = 1 - ((places[:, None] - balls.positions) ** 2).sum(-1) / balls.radii.astype(float) ** 2
-    excess = (balls.weights * KERNELS[kernel].value(x)).sum(1) - field.isovalue
+    excess = (balls.weights * POLYNOMIAL_KERNELS[kernel].value(x)).sum(1) - field.isovalue
     np.testing.assert_array_equal(is_inside, excess > 0)
     assert 0.02 < is_inside.mean() < 0.98
 

@@ -21,7 +21,7 @@ import pytest
 from exact_crossings import ONE, ExactRay, fixed, value
 
 import meniscus
-from meniscus.addon.fluid.kernels import KERNELS
+from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 
 RAYS_A_SCENE = 130
 UNIT = 2.0**-53
@@ -175,7 +175,7 @@ def mixed(random):
 
 def scenes(family):
     """The scenes of a family: all kernels, with and without balls that carve."""
-    for number, kernel in enumerate(KERNELS):
+    for number, kernel in enumerate(POLYNOMIAL_KERNELS):
         for sign, weights in enumerate((positive, mixed)):
             random = np.random.default_rng([list(FAMILIES).index(family), number, sign])
             field = meniscus.Field(kernel, float(random.uniform(0.15, 0.4)))

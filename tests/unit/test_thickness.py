@@ -9,7 +9,7 @@ import pytest
 
 import meniscus
 from meniscus.addon.fluid.kernels import KERNELS
-from meniscus.addon.render.thickness import LONGEST_SIDE, _content, at_pixels, thickness_image, typical_density
+from meniscus.addon.render.thickness import LONGEST_SIDE, at_pixels, thickness_image, typical_density
 
 SPACING = 0.05
 
@@ -67,7 +67,7 @@ def test_balls_that_carve_take_away_and_never_below_nothing():
 def test_content_is_the_integral_of_the_kernel(kernel):
     s = (np.arange(200_000) + 0.5) / 200_000
     integral = np.mean(KERNELS[kernel].value(1 - s**2) * 4 * np.pi * s**2)
-    assert _content(KERNELS[kernel]) == pytest.approx(integral, rel=1e-6)
+    assert KERNELS[kernel].content == pytest.approx(integral, rel=1e-6)
 
 
 def test_density_inside_is_that_at_the_centres_and_is_remembered():

@@ -84,7 +84,7 @@ def frame_uniforms(balls: ViewBalls, distances: BallDistances, camera: Camera, f
     """What the shaders of lib/ and this method share."""
     return {
         **camera_uniforms(camera),
-        "isovalue": field.isovalue,
+        "isovalue": field.threshold,
         "depth_scale": distances.depth_scale,
         "farthest_start": distances.farthest_start,
         "walk_window": float(np.median(balls.radii)),

@@ -165,7 +165,7 @@ class _Drawing:
         self._seen, self._request = seen, request
         self._distances = distances = BallDistances.measure(seen.balls, request.camera)
         self._variant = Variant(
-            request.field.density_kernel,
+            request.field.polynomial_kernel,
             options,
             list_length,
             with_colors=seen.with_colors,

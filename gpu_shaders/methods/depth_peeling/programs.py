@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
 
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ...kernel_constants import kernel_constants
 from ...programs import ProgramSource
@@ -49,7 +49,7 @@ class Variant:
         Whether a ray may start inside the fluid or a ball has a negative weight.
     """
 
-    kernel: Kernel
+    kernel: PolynomialKernel
     options: Options = Options()
     list_length: int = LIST_LENGTH
     with_colors: bool = False
@@ -120,7 +120,7 @@ def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     switches = [name for name in Options.__dataclass_fields__ if name != "diagnostics"]
     options = [Options(), Options(diagnostics=True), *(Options(**{name: False}) for name in switches)]
-    for kernel, option, flag in product(KERNELS.values(), options, (False, True)):
+    for kernel, option, flag in product(POLYNOMIAL_KERNELS.values(), options, (False, True)):
         yield from Variant(kernel, option, with_colors=flag, with_starts=flag).programs().values()
 
 

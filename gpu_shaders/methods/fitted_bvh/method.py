@@ -11,7 +11,7 @@ from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.errors import MeniscusError
 from ....addon.fluid.field import Field
-from ....addon.fluid.kernels import KERNELS
+from ....addon.fluid.kernels import POLYNOMIAL_KERNELS
 from ....addon.render.method import Attribute, Request, Surface, timed
 from ....addon.render.tree_builder import TREES, BuiltTree, TreeBuilder
 from ...camera_parts import image_parts
@@ -56,7 +56,7 @@ class FittedBvhMethod:
         self._tree: BuiltTree | None = None
         self._buffers: TreeBuffers | None = None
         # A driver that rejects the shaders is to be known before the method is chosen.
-        context.run(lambda: self._step_of(Variant(KERNELS["wyvill"], TreeVariant(self._with_storage))))
+        context.run(lambda: self._step_of(Variant(POLYNOMIAL_KERNELS["wyvill"], TreeVariant(self._with_storage))))
 
     @property
     def device(self) -> str:
@@ -138,7 +138,7 @@ class FittedBvhMethod:
         times = StageTimes(self._context)
         with times.of("upload"):
             buffers = self._uploaded(tree, frozenset(request.known_attributes))
-        step = self._step_of(Variant(request.field.density_kernel, buffers.variant, request.known_attributes))
+        step = self._step_of(Variant(request.field.polynomial_kernel, buffers.variant, request.known_attributes))
         step.set_uniforms({**buffers.uniforms, **tree_camera_uniforms(tree.arrays, camera, request.field)})
         with times.of("cast"):
             _cast(step, buffers, textures)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
 from ...programs import ProgramSource
@@ -29,7 +29,7 @@ class Variant:
         What is found beside depth and normal, in the order of ATTRIBUTES.
     """
 
-    kernel: Kernel
+    kernel: PolynomialKernel
     tree: TreeVariant
     attributes: tuple[Attribute, ...] = ()
 
@@ -52,7 +52,7 @@ class Variant:
 def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     subsets = [chosen for count in range(4) for chosen in combinations(ATTRIBUTES, count)]
-    for kernel, storage, weights, attributes in product(KERNELS.values(), (False, True), (False, True), subsets):
+    for kernel, storage, weights, attributes in product(POLYNOMIAL_KERNELS.values(), (False, True), (False, True), subsets):
         yield Variant(kernel, TreeVariant(storage, weights), attributes).program()
     for storage, weights in product((False, True), repeat=2):
-        yield Variant(KERNELS["wyvill"], TreeVariant(storage, weights, overlaps=True)).program()
+        yield Variant(POLYNOMIAL_KERNELS["wyvill"], TreeVariant(storage, weights, overlaps=True)).program()

@@ -84,7 +84,7 @@ def kernel_shares(field: Field) -> npt.NDArray[np.float32]:
     ``isovalue / weight`` from 0 to 1, of which the last has none.
     """
     ratios = np.arange(1, KERNEL_SHARES + 1) / KERNEL_SHARES
-    shares = field.kernel_radii(np.ones(KERNEL_SHARES), field.isovalue / ratios) * _SHRINK
+    shares = field.kernel_radii(np.ones(KERNEL_SHARES), field.threshold / ratios) * _SHRINK
     return np.append(shares, 0).astype(np.float32)
 
 
@@ -93,6 +93,6 @@ def least_x(field: Field, greatest_weight: float) -> npt.NDArray[np.float32]:
     """(33,) by their number n: of n balls that together reach the isovalue one must have at least this x; 0 for more."""
     counts = np.maximum(np.arange(_COUNTS), 1)
     # A little lower, so that rounding cannot make it too high.
-    needed = field.isovalue * (1 - 1e-4) / (counts * greatest_weight) if greatest_weight > 0 else np.full(_COUNTS, np.nan)
+    needed = field.threshold * (1 - 1e-4) / (counts * greatest_weight) if greatest_weight > 0 else np.full(_COUNTS, np.nan)
     found = np.nan_to_num(field.density_kernel.inverse(needed), nan=1.0)
     return np.append(found, 0).astype(np.float32)

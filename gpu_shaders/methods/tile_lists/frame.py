@@ -39,7 +39,7 @@ class Frame:
         uniforms = {
             **camera_uniforms(camera),
             "list_count": memory.grid.tile_count,
-            "isovalue": field.isovalue,
+            "isovalue": field.threshold,
             "eye": tuple(camera.eye.tolist()),
             # By columns, as OpenGL has it: of the transposed rotation.
             "view_from_world": tuple(camera.world_from_view[:3, :3].ravel().tolist()),

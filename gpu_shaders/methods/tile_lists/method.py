@@ -10,7 +10,7 @@ from typing import TypeVar
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
 from ....addon.fluid.errors import MeniscusError
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ....addon.render.method import Attribute, Request, Surface, timed
 from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
@@ -55,7 +55,7 @@ class TileLists:
         self._balls: BallBuffers | None = None
         self._memory: dict[tuple[int, int], Memory] = {}
         # A driver that rejects the shaders is to be known before the method is chosen.
-        context.run(lambda: self._steps_of(self._variant(KERNELS["wyvill"])))
+        context.run(lambda: self._steps_of(self._variant(POLYNOMIAL_KERNELS["wyvill"])))
 
     @property
     def device(self) -> str:
@@ -123,7 +123,7 @@ class TileLists:
         """Fill the textures: with all balls at once or, where they are too many, slab by slab from near to far."""
         balls, wanted = request.balls, frozenset(attributes)
         most = self._most_balls or self._storage.most(POSITION_BYTES)
-        steps = self._steps_of(self._variant(request.field.density_kernel, balls.weight is None, wanted))
+        steps = self._steps_of(self._variant(request.field.polynomial_kernel, balls.weight is None, wanted))
         frame = Frame(self._context, steps, self._memory_for(camera), camera, request.field)
         if len(balls) <= most and frame.find(self._uploaded(balls, wanted), Slab(-FAR, FAR, balls), textures):
             return
@@ -164,7 +164,9 @@ class TileLists:
             self._memory = {size: Memory(self._storage, *size)}
         return self._memory[size]
 
-    def _variant(self, kernel: Kernel, with_weights: bool = False, attributes: frozenset[Attribute] = frozenset()) -> Variant:
+    def _variant(
+        self, kernel: PolynomialKernel, with_weights: bool = False, attributes: frozenset[Attribute] = frozenset()
+    ) -> Variant:
         return Variant(kernel, with_weights, attributes, self._list_length, self._context.is_software)
 
     def _steps_of(self, variant: Variant) -> dict[str, ComputeStep]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import Attribute
 from ...compute_step import MOST_GROUPS
@@ -21,7 +21,7 @@ OCCLUSION_LEVELS = 16
 KERNEL_SHARES = 256
 """Parts of the table of kernel radii."""
 LARGE_OCCLUDERS = 4096
-"""Kernel spheres that groups of threads draw together; any more are drawn by single threads."""
+"""PolynomialKernel spheres that groups of threads draw together; any more are drawn by single threads."""
 THREADS = 128
 """Of a group of most steps."""
 TEAM, SHORT_LIST = 16, 64
@@ -61,7 +61,7 @@ class Variant:
         Whether OpenGL runs on the CPU.
     """
 
-    kernel: Kernel
+    kernel: PolynomialKernel
     with_weights: bool = False
     attributes: frozenset[Attribute] = frozenset()
     list_length: int = LIST_LENGTH
@@ -116,10 +116,10 @@ def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     names: tuple[Attribute, ...] = ("color", "velocity", "ball")
     subsets = [frozenset(chosen) for count in range(4) for chosen in combinations(names, count)]
-    for kernel, flag, attributes in product(KERNELS.values(), (False, True), subsets):
+    for kernel, flag, attributes in product(POLYNOMIAL_KERNELS.values(), (False, True), subsets):
         yield from Variant(kernel, flag, attributes).programs().values()
 
-    yield from Variant(KERNELS["wyvill"], is_software=True).programs().values()
+    yield from Variant(POLYNOMIAL_KERNELS["wyvill"], is_software=True).programs().values()
 
 
 def _program(name: str, **constants: object) -> ProgramSource:
