@@ -28,6 +28,8 @@ class ViewBalls:
         (M,) float64: radii of the kernel spheres, 0 where a ball alone has no surface.
     colors
         (M, 3) float32 linear Rec.709, or None.
+    indices
+        (M,) int64: which of all the balls they are.
     """
 
     centers: FloatArray
@@ -35,6 +37,7 @@ class ViewBalls:
     weights: FloatArray
     kernel_radii: FloatArray
     colors: npt.NDArray[np.float32] | None
+    indices: npt.NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.radii)
@@ -54,6 +57,7 @@ def view_balls(balls: Balls, camera: Camera, field: Field) -> ViewBalls:
         weights,
         field.kernel_radii(radii[seen], weights),
         None if balls.colors is None else np.ascontiguousarray(balls.colors[seen]),
+        np.flatnonzero(seen),
     )
 
 

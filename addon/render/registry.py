@@ -18,6 +18,8 @@ _FOLDERS = (
     "addon.render.tile_caster",
     "gpu_shaders.methods.fitted_bvh",
     "gpu_shaders.methods.depth_peeling",
+    # Those that sample come last: none is taken for what the others can draw.
+    "gpu_shaders.methods.equal_interval",
 )
 
 

@@ -13,6 +13,7 @@ Ball ball_fetch(uint id) {
     return Ball(sphere.xyz, sphere.w);
 }
 
+// Those of attributes that are wanted are in color_tx, velocity_tx (world space) and index_tx (of the ball among all balls).
 vec2 ball_density(uint id) {
     return texelFetch(density_tx, ball_texel(id), 0).xy;
 }

@@ -29,6 +29,15 @@ Chord ball_chord(Ball ball, Ray ray) {
     return Chord(1.0 - distance_2, along / ray.stretch - ball.center.z * ray.stretch, ball.radius);
 }
 
+// From the ball's centre to the point at distance t along the ray, in radii.
+vec3 ball_from_center(Ball ball, Ray ray, Chord chord, float t) {
+    vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
+    // From the centre to the middle of the chord, then along the chord.
+    vec2 offset = ball_offset(ball, ray);
+    vec3 to_middle = -vec3(offset, 0.0) + direction * (dot(offset, ray.slope) / ray.stretch);
+    return to_middle / chord.radius + direction * ((t - chord.middle) / chord.radius);
+}
+
 float chord_half_length(Chord chord) {
     return chord.radius * sqrt(max(chord.peak, 0.0));
 }

@@ -18,8 +18,7 @@ void main() {
     v_cells = ivec4(0, 0, is_seen ? 0 : -1, is_seen ? 0 : -1);
 #if TILING
     for (uint level = 0u; level < WHOLE_IMAGE && is_seen && v_level == WHOLE_IMAGE; level++) {
-        // The last pixel of a rectangle that ends on a cell's edge is in the cell before.
-        ivec4 cells = ivec4(vec4(rectangle.xy, max(ceil(rectangle.zw) - 1.0, rectangle.xy)) / cell_size(level));
+        ivec4 cells = cells_around(rectangle, level);
         if (all(lessThan(cells.zw - cells.xy, ivec2(CELLS_ACROSS)))) {
             v_level = level;
             v_cells = cells;

@@ -1,6 +1,6 @@
 // The range of distances that the pixels of a fine cell ask for: PHASE_PEELING or PHASE_WALKING from their last crossing to
 // their barrier, PHASE_DONE at their surface. A pixel goes on asking until both of its states know that it is done.
-#include "methods/depth_peeling/range.glsl"
+#include "lib/range.glsl"
 #include "methods/depth_peeling/state.glsl"
 
 uniform usampler2D state_tx;

@@ -22,16 +22,11 @@ void main() {
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
     Ball ball = Ball(v_sphere.xyz, v_sphere.w);
     Chord chord = ball_chord(ball, ray);
-    float from_middle = (state.depth / depth_scale - chord.middle) / chord.radius;
-    float x = chord.peak - from_middle * from_middle;
+    float t = state.depth / depth_scale;
+    float x = chord_x(chord, t);
     if (x <= 0.0)
         discard;
-    vec3 direction = vec3(ray.slope, -1.0) / ray.stretch;
-    // From the centre to the middle of the chord, then along the chord.
-    vec2 offset = ball_offset(ball, ray);
-    vec3 to_middle = -vec3(offset, 0.0) + direction * (dot(offset, ray.slope) / ray.stretch);
-    vec3 from_center = to_middle / chord.radius + direction * from_middle;
-    out_gradient = vec4(v_density.x * kernel_derivative(x) / chord.radius * from_center, 0.0);
+    out_gradient = vec4(v_density.x * kernel_derivative(x) / chord.radius * ball_from_center(ball, ray, chord, t), 0.0);
     float share = max(v_density.x * kernel_value(x), 0.0);
 #if WITH_COLORS
     out_color = vec4(share * texelFetch(color_tx, ball_texel(v_id), 0).rgb, share);

@@ -13,15 +13,16 @@ from ....addon.fluid.errors import InputError
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.fluid.view_balls import ViewBalls, view_balls
 from ....addon.render.method import Attribute, Request, Surface, timed
+from ...ball_textures import BALL_TEXTURE_WIDTH, BallDistances, ball_textures
 from ...camera_parts import image_parts
 from ...context import GpuContext, shared_context
 from ...surface_textures import SurfaceTextures
-from .balls import BallDistances, ball_textures, frame_uniforms, in_spatial_order
+from .balls import frame_uniforms, in_spatial_order
 from .frame import Frame
 from .groups import Groups, ball_groups
 from .options import Options
 from .params import MAX_BALLS, METHOD
-from .programs import BALL_TEXTURE_WIDTH, LIST_LENGTH, LIST_TARGETS, Variant
+from .programs import LIST_LENGTH, LIST_TARGETS, Variant
 from .targets import Workspace
 
 # An image of this many pixels takes some 250 MB; a larger one is drawn in parts.
@@ -171,7 +172,7 @@ class _Drawing:
             with_colors=seen.with_colors,
             with_starts=distances.with_starts,
         )
-        self._textures = ball_textures(context.gl, seen.balls, seen.with_colors)
+        self._textures = ball_textures(context.gl, seen.balls, seen.attributes)
 
     def draw(self, region: Region, output: SurfaceTextures, corner: tuple[int, int]) -> dict[str, int]:
         """Draw the region to a corner of `output`; counts of what happened."""

@@ -9,19 +9,16 @@ from itertools import product
 
 from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
+from ...ball_textures import BALL_TEXTURE_WIDTH
+from ...image_cells import CELL_FACTOR, CELL_SIZE
 from ...kernel_constants import kernel_constants
 from ...programs import ProgramSource
 from .options import Options
 
 FOLDER = "methods/depth_peeling"
-BALL_TEXTURE_WIDTH = 4096
 LIST_TARGETS = 4
 """N_buf render targets of four words hold the state, which takes two, and 4 N_buf - 2 = 14 ids, as in the paper."""
 LIST_LENGTH = 4 * LIST_TARGETS - 2
-CELL_SIZE = 8
-"""Side of the smallest cells, pixels."""
-CELL_FACTOR = 4
-"""Cells along the side of one of the next level."""
 BEZIER_STACK = 3
 
 
@@ -98,7 +95,7 @@ class Variant:
         for phase in Phase:
             constants = {"CELL_SIZE": CELL_SIZE, "CELL_PHASE": int(phase)}
             yield _program(f"cells_from_pixels_{phase.name.lower()}", "screen", "cells_from_pixels", **constants)
-        yield _program("cells_from_cells", "screen", "cells_from_cells")
+        yield ProgramSource("cells_from_cells", "lib/screen.vert", "lib/cells_from_cells.frag")
 
     def _balls(self) -> dict[str, object]:
         return {"BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH, "TIGHT_RECTANGLES": int(self.options.tight_rectangles)}

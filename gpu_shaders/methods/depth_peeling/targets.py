@@ -7,8 +7,9 @@ import moderngl
 from ...buffer_texture import BufferTexture
 from ...capture import Capture
 from ...context import GpuContext
+from ...image_cells import CellTargets, plain
 from ...occlusion import OcclusionQueries
-from .programs import CELL_FACTOR, CELL_SIZE, LIST_TARGETS
+from .programs import LIST_TARGETS
 
 FIRST_PAIRS = 2**16
 """Room for pairs to begin with; it grows."""
@@ -48,10 +49,10 @@ class Targets:
         self.with_iterations = with_iterations
 
         def words(components: int) -> moderngl.Texture:
-            return _plain(gl.texture(size, components, dtype="u4"))
+            return plain(gl.texture(size, components, dtype="u4"))
 
         def floats(components: int) -> moderngl.Texture:
-            return _plain(gl.texture(size, components, dtype="f4"))
+            return plain(gl.texture(size, components, dtype="f4"))
 
         self.kernel_depth = context.depth_texture(size)
         self.start_density = floats(2)
@@ -75,36 +76,3 @@ class Targets:
         self.walk = gl.framebuffer(self.sums[:1])
         self.gather = gl.framebuffer(self.sums)
         self.cells = CellTargets(gl, size)
-
-
-class CellTargets:
-    """What the cells of the image ask for, level by level; see cells.glsl.
-
-    Attributes
-    ----------
-    across, down
-        The numbers of the smallest cells along the image's sides.
-    levels, framebuffers
-        A texture and its framebuffer for each level, from the smallest cells to the whole image.
-    factors
-        How many pixels, or cells of the level before, lie along a cell's side.
-    """
-
-    def __init__(self, gl: moderngl.Context, size: tuple[int, int]) -> None:
-        sizes = [size]
-        for factor in (CELL_SIZE, CELL_FACTOR, CELL_FACTOR):
-            sizes.append((-(-sizes[-1][0] // factor), -(-sizes[-1][1] // factor)))
-        self.across, self.down = sizes[1]
-        self.levels = [_plain(gl.texture(level_size, 2, dtype="f4")) for level_size in (*sizes[1:], (1, 1))]
-        self.framebuffers = [gl.framebuffer([texture]) for texture in self.levels]
-        self.factors = [CELL_SIZE, CELL_FACTOR, CELL_FACTOR, max(sizes[3])]
-
-    @property
-    def textures(self) -> dict[str, moderngl.Texture]:
-        """By sampler name."""
-        return {f"cells_{level}_tx": texture for level, texture in enumerate(self.levels)}
-
-
-def _plain(texture: moderngl.Texture) -> moderngl.Texture:
-    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    return texture

@@ -1,5 +1,5 @@
 // The range of distances that a larger cell asks for, from those of the smaller ones in it.
-#include "methods/depth_peeling/range.glsl"
+#include "lib/range.glsl"
 
 uniform sampler2D smaller_tx;
 uniform int smaller_count; // along a larger cell's side

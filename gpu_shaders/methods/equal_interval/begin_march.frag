@@ -1,0 +1,18 @@
+// Each ray before its first sample, at the near clip distance.
+#include "lib/ray.glsl"
+#include "lib/sampling/bracket.glsl"
+#include "methods/equal_interval/march.glsl"
+
+uniform sampler2D side_tx;
+uniform vec2 clip_distances; // planar
+
+layout(location = 0) out vec4 out_march;
+layout(location = 1) out vec4 out_bracket;
+
+void main() {
+    float start = clip_distances.x * ray_from_pixel(gl_FragCoord.xy).stretch;
+    March march = March(start, texelFetch(side_tx, ivec2(gl_FragCoord.xy), 0).y, start, GOING, 0);
+    out_march = march_pack(march);
+    out_bracket = NO_BRACKET;
+    gl_FragDepth = march_depth(march);
+}

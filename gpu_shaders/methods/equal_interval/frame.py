@@ -1,0 +1,119 @@
+"""One image on its way through the shaders of Equal Interval."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+
+import moderngl
+
+from ....addon.render.settings import Value
+from ...context import GpuContext
+from ...image_cells import plain
+from ...occlusion import OcclusionQueries, OcclusionQuery
+from ...sampling.passes import SamplingPasses
+from ...sampling.targets import SamplingTargets
+from .params import GRACE
+
+BATCH = 4
+"""Rounds between two looks at what is left, where rays may go on beyond the limit."""
+SAMPLES_A_ROUND = 4
+_NOTHING_AHEAD = 3e38
+
+
+class MarchTargets:
+    """What this method draws into beside the shared targets.
+
+    Attributes
+    ----------
+    marches
+        Two, see march.glsl: `advance` draws into one, and into the bracket of the same number, while the others are read.
+    next
+        What lies ahead, see next.frag; `ahead` draws into it.
+    """
+
+    def __init__(self, context: GpuContext, shared: SamplingTargets) -> None:
+        gl = context.gl
+        self.shared = shared
+        self.marches = [plain(gl.texture(shared.size, 4, dtype="f4")) for _ in range(2)]
+        self.next = plain(gl.texture(shared.size, 4, dtype="f4"))
+        pairs = zip(self.marches, shared.brackets, strict=True)
+        self.advance = [gl.framebuffer([march, bracket], shared.depth) for march, bracket in pairs]
+        self.ahead = gl.framebuffer([self.next], shared.depth)
+        self.ahead.depth_mask = False
+
+
+class Frame:
+    """Finds where the rays of one image meet the surface; on the context's thread.
+
+    Parameters
+    ----------
+    passes, targets
+        Where to draw.
+    queries
+        For the occlusion queries.
+    settings
+        The method's.
+    check_cancelled
+        Called between batches; may raise.
+    """
+
+    def __init__(
+        self,
+        passes: SamplingPasses,
+        targets: MarchTargets,
+        queries: OcclusionQueries,
+        settings: Mapping[str, Value],
+        check_cancelled: Callable[[], None],
+    ) -> None:
+        self._passes, self._targets, self._queries = passes, targets, queries
+        self._check_cancelled = check_cancelled
+        limit = int(settings["samples"])
+        self._is_adaptive = bool(settings["adaptive"])
+        self._most_samples = GRACE * limit if self._is_adaptive else limit
+        self._rounds = -(-self._most_samples // SAMPLES_A_ROUND)
+        passes.steps["advance"].set_uniforms({"most_samples": self._most_samples})
+
+    def march(self) -> dict[str, int]:
+        """Take samples until all rays have stopped; counts of what happened."""
+        self._passes.over_screen("begin_march", self._targets.advance[self._passes.now])
+        counts = {"rounds": 0, "samples": 0}
+        previous: OcclusionQuery | None = None
+        while counts["rounds"] < self._rounds:
+            self._check_cancelled()
+            # Without the adaptive interval nothing is waited for until the end.
+            batch = min(BATCH, self._rounds - counts["rounds"]) if self._is_adaptive else self._rounds
+            queries = self._queries.take(batch)
+            for query in queries:
+                self._round(query, previous)
+                previous = query
+            counts["rounds"] += batch
+            asking = [query.samples for query in queries] if self._is_adaptive else []
+            counts["samples"] += SAMPLES_A_ROUND * sum(asking)
+            if self._is_adaptive and not asking[-1]:
+                break
+        if not self._is_adaptive:
+            counts["samples"] = SAMPLES_A_ROUND * sum(query.samples for query in queries)
+        counts["unfinished"] = self._count_unfinished()
+        return counts
+
+    def _round(self, query: OcclusionQuery, previous: OcclusionQuery | None) -> None:
+        """Four samples for each ray that still goes; balls are only drawn where there is one, which `query` learns."""
+        passes, targets = self._passes, self._targets
+        march = targets.marches[passes.now]
+        targets.ahead.clear(_NOTHING_AHEAD, _NOTHING_AHEAD, _NOTHING_AHEAD, 0.0)
+        with nullcontext() if previous is None else previous.required():
+            passes.blend(moderngl.MIN, moderngl.FUNC_ADD)
+            passes.over_balls("next", targets.ahead, moderngl.BLEND | moderngl.DEPTH_TEST, march_tx=march)
+        passes.over_screen("place", targets.shared.ask, march_tx=march, next_tx=targets.next)
+        passes.count(query)
+        with query.required():
+            passes.sum_density()
+        read = {"march_tx": march, "bracket_tx": passes.bracket}
+        passes.over_screen("advance", targets.advance[1 - passes.now], **read)
+        passes.turn()
+
+    def _count_unfinished(self) -> int:
+        query = self._queries.take(1)[0]
+        self._passes.count(query, "unfinished", march_tx=self._targets.marches[self._passes.now])
+        return query.samples

@@ -1,0 +1,28 @@
+"""The programs of Equal Interval, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, product
+
+from ....addon.fluid.kernels import KERNELS
+from ....addon.render.method import ATTRIBUTES
+from ...programs import ProgramSource
+from ...sampling.programs import SamplingVariant, over_screen
+
+FOLDER = "methods/equal_interval"
+
+
+def programs_of(variant: SamplingVariant) -> Iterator[ProgramSource]:
+    """The programs of a frame."""
+    yield from variant.programs()
+    yield variant.over_balls("next", f"{FOLDER}/next.frag", WITH_NEAREST=0)
+    for name in ("begin_march", "place", "advance", "unfinished"):
+        yield over_screen(name, f"{FOLDER}/{name}.frag")
+
+
+def all_programs() -> Iterator[ProgramSource]:
+    """Every program with every combination of constants that it may be compiled with."""
+    subsets = [chosen for count in range(4) for chosen in combinations(ATTRIBUTES, count)]
+    for kernel, attributes, culling in product(KERNELS.values(), subsets, (False, True)):
+        yield from programs_of(SamplingVariant(kernel, attributes, culling))

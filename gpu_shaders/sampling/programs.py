@@ -1,0 +1,79 @@
+"""The programs that methods share that sample, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...addon.fluid.kernels import Kernel
+from ...addon.fluid.passes import DEPTH_BACKGROUND
+from ...addon.render.method import Attribute
+from ..ball_textures import BALL_TEXTURE_WIDTH
+from ..image_cells import CELL_FACTOR, CELL_SIZE
+from ..kernel_constants import kernel_constants
+from ..programs import ProgramSource
+
+FOLDER = "lib/sampling"
+
+
+@dataclass(frozen=True)
+class SamplingVariant:
+    """What the programs of a frame depend on.
+
+    Attributes
+    ----------
+    kernel
+        The density kernel.
+    attributes
+        What is found beside depth and normal, in the order of ATTRIBUTES.
+    ball_culling
+        Whether a ball is left out that reaches no sample of the pixels around it.
+    """
+
+    kernel: Kernel
+    attributes: tuple[Attribute, ...] = ()
+    ball_culling: bool = True
+
+    def programs(self) -> Iterator[ProgramSource]:
+        """All of them."""
+        attributes = self._attributes()
+        kernel = kernel_constants(self.kernel)
+        yield self.over_balls("density", f"{FOLDER}/density.frag", **kernel)
+        yield self.over_balls("gather", f"{FOLDER}/gather.frag", **kernel, **attributes)
+        if "ball" in self.attributes:
+            yield self.over_balls("dominant", f"{FOLDER}/dominant.frag", **kernel)
+        for name in ("begin", "start", "count", "guess", "narrow", "found"):
+            yield over_screen(name, f"{FOLDER}/{name}.frag")
+        yield over_screen("finish", f"{FOLDER}/finish.frag", **attributes, DEPTH_BACKGROUND=f"float({DEPTH_BACKGROUND!r})")
+        yield over_screen("cells_from_samples", f"{FOLDER}/cells_from_samples.frag", CELL_SIZE=CELL_SIZE)
+        yield over_screen("cells_from_cells", "lib/cells_from_cells.frag")
+
+    def over_balls(self, name: str, fragment: str, **constants: object) -> ProgramSource:
+        """A program that draws each ball's rectangle; with the constant WITH_NEAREST=0 also of those behind all samples."""
+        drawn = {
+            "BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH,
+            "TIGHT_RECTANGLES": 1,
+            "BALL_CULLING": int(self.ball_culling),
+            "WITH_NEAREST": 1,
+            "CELL_SIZE": CELL_SIZE,
+            "CELL_FACTOR": CELL_FACTOR,
+        }
+        return ProgramSource(
+            name, f"{FOLDER}/billboard.vert", fragment, constants=tuple(sorted({**drawn, **constants}.items()))
+        )
+
+    def _attributes(self) -> dict[str, object]:
+        """Which attributes there are, and at which places sums and results are written."""
+        constants: dict[str, object] = {
+            "WITH_COLORS": int("color" in self.attributes),
+            "WITH_VELOCITIES": int("velocity" in self.attributes),
+            "WITH_BALLS": int("ball" in self.attributes),
+        }
+        constants |= {f"{name.upper()}_LOCATION": place for place, name in enumerate(self.attributes, start=2)}
+        summed = [name for name in self.attributes if name != "ball"]
+        return constants | {f"{name.upper()}_SUM": place for place, name in enumerate(summed, start=1)}
+
+
+def over_screen(name: str, fragment: str, **constants: object) -> ProgramSource:
+    """A program that draws every pixel once."""
+    return ProgramSource(name, "lib/screen.vert", fragment, constants=tuple(sorted(constants.items())))
