@@ -66,13 +66,17 @@ class SamplingPasses:
         self._now = 1 - self._now
 
     def start(self, may_start_inside: bool, threshold: float) -> None:
-        """Find out on which side of the surface the rays start; outside where they may not start inside."""
-        if not may_start_inside:
-            self.targets.start.clear(1.0, -threshold)
-            return
+        """Find out on which side of the surface the rays start; outside where they may not start inside.
+
+        The cells of the image then ask for the starts of the rays.
+        """
         self.over_screen("begin", self.targets.ask)
-        self.sum_density()
-        self.over_screen("start", self.targets.start)
+        if may_start_inside:
+            self.sum_density()
+            self.over_screen("start", self.targets.start)
+        else:
+            self._measure()
+            self.targets.start.clear(1.0, -threshold)
 
     def sum_density(self) -> None:
         """Sum the densities at the samples."""

@@ -1,6 +1,5 @@
 // Each ray before its first sample, at the near clip distance.
 #include "lib/ray.glsl"
-#include "lib/sampling/bracket.glsl"
 #include "methods/equal_interval/march.glsl"
 
 uniform sampler2D side_tx;
@@ -13,6 +12,6 @@ void main() {
     float start = clip_distances.x * ray_from_pixel(gl_FragCoord.xy).stretch;
     March march = March(start, texelFetch(side_tx, ivec2(gl_FragCoord.xy), 0).y, start, GOING, 0);
     out_march = march_pack(march);
-    out_bracket = NO_BRACKET;
+    out_bracket = past_pack(Past(start, NO_PAST, 1.0, 0.0));
     gl_FragDepth = march_depth(march);
 }

@@ -105,11 +105,11 @@ class Frame:
         with nullcontext() if previous is None else previous.required():
             passes.blend(moderngl.MIN, moderngl.FUNC_ADD)
             passes.over_balls("next", targets.ahead, moderngl.BLEND | moderngl.DEPTH_TEST, march_tx=march)
-        passes.over_screen("place", targets.shared.ask, march_tx=march, next_tx=targets.next)
+        read = {"march_tx": march, "bracket_tx": passes.bracket}
+        passes.over_screen("place", targets.shared.ask, next_tx=targets.next, **read)
         passes.count(query)
         with query.required():
             passes.sum_density()
-        read = {"march_tx": march, "bracket_tx": passes.bracket}
         passes.over_screen("advance", targets.advance[1 - passes.now], **read)
         passes.turn()
 

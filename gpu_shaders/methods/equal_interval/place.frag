@@ -1,9 +1,10 @@
-// The next four samples of each ray (Mishima et al. 2008, section 4.2); none where no ball is ahead.
+// The next four samples of each ray (Mishima et al. 2008, section 4.2), or those around a peak; none where no ball is ahead.
 #include "lib/ray.glsl"
 #include "lib/sampling/samples.glsl"
 #include "methods/equal_interval/march.glsl"
 
 uniform sampler2D march_tx;
+uniform sampler2D bracket_tx;
 uniform sampler2D next_tx;       // see next.frag
 uniform vec2 clip_distances;     // planar
 uniform float interval;          // a share of the influence radius
@@ -34,6 +35,10 @@ void main() {
             width *= clamp(CROWD * interval / max(next.w * width, 1e-30), SHORTEST, 1.0);
         width = max(width, RESOLUTION * next.x);
         out_samples = next.x + width * vec4(0.0, 1.0, 2.0, 3.0);
+    }
+    if (march.status == LOOKING) {
+        Past past = past_unpack(texelFetch(bracket_tx, pixel, 0));
+        out_samples = past.peak + past.aside * vec4(-3.0, -1.0, 1.0, 3.0);
     }
     gl_FragDepth = samples_depth(out_samples);
 }
