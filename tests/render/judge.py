@@ -13,6 +13,38 @@ from meniscus.addon.fluid.kernels import KERNELS
 UNDECIDABLE = 1e-4
 
 
+@dataclass(frozen=True)
+class Bounds:
+    """How much an image may be off.
+
+    Attributes
+    ----------
+    wrong
+        The share of pixels, of those that can be decided, that may hit where they should not or not where they should, or at
+        a distance off by more than `distance`.
+    distance, rms
+        |dt| / R of the others, R of the ball that dominates at the hit.
+    angle, tilted
+        Between normals, degrees; and the share of pixels that may be off by more.
+    """
+
+    wrong: float
+    distance: float
+    rms: float
+    angle: float
+    tilted: float
+
+
+EXACT = Bounds(wrong=0.0, distance=1e-3, rms=1e-4, angle=0.5, tilted=0.0)
+# Methods that sample state what they may miss. A normal jumps at creases, which power_1 has, so a small error makes it another.
+BOUNDS = {"equal_interval": Bounds(wrong=1e-3, distance=0.02, rms=1e-3, angle=0.5, tilted=2e-3)}
+
+
+def bounds_of(method: str) -> Bounds:
+    """What the method states of itself."""
+    return BOUNDS.get(method, EXACT)
+
+
 @dataclass
 class Expected:
     """What the oracle says of every pixel: (pixels,) unless said; distances along unit rays."""
@@ -102,8 +134,8 @@ class Verdict:
         |dt| / R, R of the ball that dominates at the hit.
     relative_rms
         |dt| / t, as Kanamori, Szego and Nishita 2008, section 6, measure it.
-    worst_angle
-        Between normals, degrees.
+    worst_angle, tilted
+        Between normals, degrees; and how many pixels are off by more than the bound.
     """
 
     compared: int
@@ -113,10 +145,12 @@ class Verdict:
     rms: float
     relative_rms: float
     worst_angle: float
+    tilted: int
 
 
 def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera, pixels: np.ndarray | slice = slice(None)) -> Verdict:
-    """Compare every pixel of an image, or some, with the oracle."""
+    """Compare every pixel of an image, or some, with the oracle; what is wrong goes by the bounds of its method."""
+    bounds = bounds_of(image.info.method)
     want = expected(scene.balls, scene.field, camera, pixels)
     places = np.arange(camera.width * camera.height)[pixels]
     hit, should_hit = image.hit.ravel()[pixels], np.isfinite(want.t)
@@ -124,7 +158,7 @@ def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera, pixels
     both = hit & should_hit
     error = np.zeros(len(t))
     error[both] = np.abs(t[both] - want.t[both]) / want.radius[both]
-    suspects = np.flatnonzero((hit != should_hit) | (error > 1e-3))
+    suspects = np.flatnonzero((hit != should_hit) | (error > bounds.distance))
     undecidable = [index for index in suspects if is_undecidable(scene.balls, scene.field, want, index, camera, t[index])]
     wrong = [
         f"{divmod(int(places[index]), camera.width)}: t = {t[index]:.7g}, oracle {want.t[index]:.7g}, "
@@ -132,7 +166,7 @@ def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera, pixels
         for index in suspects
         if index not in undecidable
     ]
-    both[undecidable] = False
+    both[suspects if bounds.wrong else undecidable] = False
     normals = image["normal"].reshape(-1, 3)[pixels][both].astype(np.float64)
     cross = np.cross(normals, want.normals[both])
     dot = np.einsum("ij,ij->i", normals, want.normals[both])
@@ -145,6 +179,7 @@ def compare(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera, pixels
         rms=_rms(error[both]),
         relative_rms=_rms(error[both] * want.radius[both] / want.t[both]),
         worst_angle=float(angle.max(initial=0.0)),
+        tilted=int(np.count_nonzero(angle > bounds.angle)),
     )
 
 
@@ -153,10 +188,12 @@ def _rms(values: np.ndarray) -> float:
 
 
 def judge(image: meniscus.ImageBuffers, scene, camera: meniscus.Camera) -> None:
-    """Assert the bounds that every exact method keeps: hits, distances, normals."""
-    verdict = compare(image, scene, camera)
-    assert not verdict.wrong, f"{len(verdict.wrong)} wrong pixels of {verdict.compared}: {verdict.wrong[:5]}"
-    assert verdict.undecidable <= 0.002 * camera.width * camera.height, "too many pixels cannot be decided"
-    assert verdict.worst <= 1e-3
-    assert verdict.rms <= 1e-4
-    assert verdict.worst_angle <= 0.5
+    """Assert the bounds of the image's method: hits, distances, normals."""
+    verdict, bounds = compare(image, scene, camera), bounds_of(image.info.method)
+    pixels = camera.width * camera.height
+    wrong = f"{len(verdict.wrong)} wrong pixels of {verdict.compared}: {verdict.wrong[:5]}"
+    assert len(verdict.wrong) <= bounds.wrong * pixels, wrong
+    assert verdict.undecidable <= 0.002 * pixels, "too many pixels cannot be decided"
+    assert verdict.worst <= bounds.distance
+    assert verdict.rms <= bounds.rms
+    assert verdict.tilted <= bounds.tilted * pixels, f"{verdict.tilted} normals are off, by up to {verdict.worst_angle} degrees"

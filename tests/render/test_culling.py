@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judge import expected, is_undecidable
+from judge import bounds_of, expected, is_undecidable
 from scenes import Scene
 
 import meniscus
@@ -55,7 +55,7 @@ def mixed(seed: int) -> Scene:
 @pytest.mark.parametrize("make", [carved, carved_by_one, mixed])
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_hidden_could_not_be_seen(method, make, seed, projection):
-    scene = make(seed)
+    scene, bounds = make(seed), bounds_of(method)
     camera = replace(scene.camera(projection), width=WIDTH, height=HEIGHT)
     image = meniscus.render(scene.balls, camera, scene.field, method=method)
     assert image.hit.mean() > 0.2
@@ -63,7 +63,7 @@ def test_what_is_hidden_could_not_be_seen(method, make, seed, projection):
     want = expected(scene.balls, scene.field, camera, pixels)
     t = np.where(image.hit, image["depth"], np.inf).ravel()[pixels] * want.stretch
     apart = np.abs(np.subtract(t, want.t, out=np.zeros(PIXELS), where=np.isfinite(t) & np.isfinite(want.t)))
-    wrong = np.flatnonzero((np.isfinite(t) != np.isfinite(want.t)) | (apart > 1e-3 * want.radius))
+    wrong = np.flatnonzero((np.isfinite(t) != np.isfinite(want.t)) | (apart > bounds.distance * want.radius))
     undecidable = [index for index in wrong if is_undecidable(scene.balls, scene.field, want, index, camera, t[index])]
     assert len(undecidable) <= 0.002 * PIXELS
-    assert len(wrong) == len(undecidable)
+    assert len(wrong) - len(undecidable) <= bounds.wrong * PIXELS

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judge import expected, judge
+from judge import bounds_of, expected, judge
 from scenes import SCENES
 
 import meniscus
@@ -83,7 +83,8 @@ def test_depth_contrast_is_that_of_the_exact_depths(method, projection):
     assert np.ptp(factor[hit]) > 1, "the scene should have steps in depth"
     both = hit & (plain[..., 3] > 0)
     assert np.count_nonzero(hit != (plain[..., 3] > 0)) <= 2
-    np.testing.assert_allclose(changed[both][:, 2], plain[both][:, 2] * factor[both], atol=2e-3)
+    off = ~np.isclose(changed[both][:, 2], plain[both][:, 2] * factor[both], rtol=1e-7, atol=2e-3)
+    assert np.count_nonzero(off) <= bounds_of(method).wrong * off.size
     np.testing.assert_array_equal(changed[..., 3], plain[..., 3])
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judge import judge
+from judge import bounds_of, compare, judge
 from scenes import Scene
 
 import meniscus
@@ -34,11 +34,16 @@ def random_scene(seed):
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("method", [info.name for info in method_infos()])
 def test_random_views_match_the_oracle(method, projection):
-    hits = 0
+    hits, wrong, bounds = 0, [], bounds_of(method)
     for seed in range(40):
         scene = random_scene(seed)
         camera = replace(scene.camera(projection), width=32, height=24)
         image = meniscus.render(scene.balls, camera, scene.field, method=method)
-        judge(image, scene, camera)
+        if bounds.wrong:
+            # An image of so few pixels can be wrong at one and not at a thousandth.
+            wrong += compare(image, scene, camera).wrong
+        else:
+            judge(image, scene, camera)
         hits += int(image.hit.sum())
+    assert len(wrong) <= bounds.wrong * 40 * 32 * 24, wrong
     assert hits > 0.1 * 40 * 32 * 24

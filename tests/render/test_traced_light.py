@@ -50,8 +50,10 @@ class Traced:
     def images(self, opengl, method="fitted_bvh", with_storage=False, projection="perspective", light=None):
         """(height, width, 4) by the graphics processor and by the native core, and where there is a surface."""
         balls, camera = self.scene.balls, self.scene.camera(projection)
-        request = Request(balls, camera, self.scene.field, frozenset({"color"}), 0, lambda _: None)
-        surface = create_method(method)[1].find_surface_on_device(request)
+        info, runner = create_method(method)
+        settings = {setting.name: setting.default for setting in info.settings}
+        request = Request(balls, camera, self.scene.field, frozenset({"color"}), 0, lambda _: None, settings=settings)
+        surface = runner.find_surface_on_device(request)
         light = light or TracedLight(opengl, with_storage)
         found = opengl.run(lambda: self._on_device(light, surface, camera))
         passes = surface.read_back()

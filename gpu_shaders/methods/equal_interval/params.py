@@ -39,7 +39,7 @@ METHOD = MethodInfo(
             "refinements",
             "Refinements",
             "How often a secant brings the surface nearer; 0 shows the samples themselves, more than 1 needs more samples",
-            2,
+            3,
             0,
             16,
         ),

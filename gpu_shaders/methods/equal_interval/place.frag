@@ -29,8 +29,12 @@ void main() {
     vec4 next = texelFetch(next_tx, pixel, 0);
     float end = clip_distances.y * ray_from_pixel(gl_FragCoord.xy).stretch;
     out_samples = NO_SAMPLES;
+    bool leaps = next.x > march.asked;
+    // The way from the last sample to the far clip distance has a sample at its end.
+    if (!leaps && march.t < end)
+        next.x = min(next.x, end);
     if (march.status == GOING && next.x <= end) {
-        float width = next.x <= march.asked ? next.y : after_leap(next);
+        float width = leaps ? after_leap(next) : next.y;
         if (is_adaptive)
             width *= clamp(CROWD * interval / max(next.w * width, 1e-30), SHORTEST, 1.0);
         width = max(width, RESOLUTION * next.x);
