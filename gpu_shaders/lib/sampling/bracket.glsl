@@ -25,7 +25,7 @@ bool bracket_is_there(Bracket bracket) {
 // Where the straight line between the ends meets 0 (Mishima et al. 2008, equation 5).
 float bracket_secant(Bracket bracket) {
     float share = -bracket.value_before / max(bracket.value_behind - bracket.value_before, 1e-30);
-    return mix(bracket.before, bracket.behind, clamp(share, 0.0, 1.0));
+    return bracket.before + clamp(share, 0.0, 1.0) * (bracket.behind - bracket.before);
 }
 
 // A sample narrows the bracket from the side that it lies on; of several roots the first that is known stays.

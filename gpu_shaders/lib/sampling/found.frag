@@ -12,7 +12,10 @@ layout(location = 0) out vec4 out_samples;
 
 void main() {
     Bracket bracket = bracket_unpack(texelFetch(bracket_tx, ivec2(gl_FragCoord.xy), 0));
-    float t = uses_secant ? bracket_secant(bracket) : bracket.behind;
+    float t = bracket_secant(bracket);
+    // Where the secant ends outside, because the density leaps up, no ball may reach there to tell the normal.
+    if (t <= bracket.before || !uses_secant)
+        t = bracket.behind;
     bool is_seen = bracket_is_there(bracket) && t <= clip_distances.y * ray_from_pixel(gl_FragCoord.xy).stretch;
     out_samples = is_seen ? vec4(t) : NO_SAMPLES;
     gl_FragDepth = samples_depth(out_samples);

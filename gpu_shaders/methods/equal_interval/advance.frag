@@ -38,6 +38,11 @@ Past past_of_peak(Point a, Point b, Point c) {
 
 void go_on(inout March march, inout Past past, vec4 samples, vec4 values) {
     float width = samples.y - samples.x;
+    // On the way of a leap nothing rises: what is above the threshold behind it is so from there on.
+    if (samples.x > march.asked && values.x >= 0.0) {
+        march.t = samples.x;
+        march.value = values.x;
+    }
     for (int i = 0; i < 4; i++) {
         if (march.status == GOING && values[i] >= 0.0) {
             out_bracket = bracket_pack(Bracket(march.t, samples[i], march.value, values[i]));
