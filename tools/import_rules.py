@@ -39,7 +39,11 @@ AREAS = (
     Area("addon/output", ("addon/fluid", "addon/output"), frozenset({"numpy", "OpenEXR"})),
     Area("addon/render", ("addon/fluid", "addon/render", "gpu_shaders"), frozenset({"numpy", "meniscus_native"})),
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
-    Area("gpu_shaders", ("addon/fluid", *TREES, "addon/render/method", "addon/render/settings", "gpu_shaders"), OPENGL | {"numpy"}),
+    Area(
+        "gpu_shaders",
+        ("addon/fluid", *TREES, "addon/render/method", "addon/render/settings", "gpu_shaders"),
+        OPENGL | {"numpy"},
+    ),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),
 )
 

@@ -47,9 +47,10 @@ class SamplingPasses:
     def bind(self, textures: Mapping[str, moderngl.Texture], uniforms: Mapping[str, object]) -> None:
         """Give every step the balls and the camera."""
         shared = {**textures, **self.targets.cells.textures, "samples_tx": self.samples, "density_sum_tx": self.sums}
+        shared |= {"side_tx": self.targets.side, "barrier_tx": self.targets.barrier}
         for step in self.steps.values():
             step.set_uniforms(uniforms)
-            step.textures.update({**shared, "side_tx": self.targets.side})
+            step.textures.update(shared)
 
     @property
     def now(self) -> int:
@@ -75,12 +76,18 @@ class SamplingPasses:
             self.sum_density()
             self.over_screen("start", self.targets.start)
         else:
-            self._measure()
+            self.measure()
             self.targets.start.clear(1.0, -threshold)
+
+    def find_barriers(self, may_carve: bool) -> None:
+        """Find the nearest kernel spheres; none where balls of negative weight may carve them."""
+        self.targets.bar.clear(depth=1.0)
+        if not may_carve:
+            self.over_balls("barrier", self.targets.bar, moderngl.DEPTH_TEST)
 
     def sum_density(self) -> None:
         """Sum the densities at the samples."""
-        self._measure()
+        self.measure()
         self.targets.density.clear()
         self.blend(moderngl.FUNC_ADD)
         self.over_balls("density", self.targets.density, moderngl.BLEND | moderngl.DEPTH_TEST)
@@ -103,7 +110,7 @@ class SamplingPasses:
         targets = self.targets
         self.steps["found"].set_uniforms({"uses_secant": uses_secant})
         self.over_screen("found", targets.ask, bracket_tx=self.bracket)
-        self._measure()
+        self.measure()
         targets.gather.clear()
         self.blend(moderngl.FUNC_ADD)
         self.over_balls("gather", targets.gather, moderngl.BLEND | moderngl.DEPTH_TEST)
@@ -121,10 +128,13 @@ class SamplingPasses:
         sums = dict(zip(names, self.targets.sums, strict=False))
         self.over_screen("finish", output.framebuffer, **sums, dominant_tx=self.targets.dominant)
 
-    def _measure(self) -> None:
-        """The range of distances that each cell of the image asks for (Mishima et al. 2008, section 4.3)."""
+    def measure(self, name: str = "cells_from_samples", **textures: Texture) -> None:
+        """The range of distances that each cell of the image asks for (Mishima et al. 2008, section 4.3).
+
+        It is that of the samples, or what the step of this name tells of the finest cells.
+        """
         cells = self.targets.cells
-        self.over_screen("cells_from_samples", cells.framebuffers[0])
+        self.over_screen(name, cells.framebuffers[0], **textures)
         for level in range(1, len(cells.levels)):
             self.steps["cells_from_cells"].set_uniforms({"smaller_count": cells.factors[level]})
             self.over_screen("cells_from_cells", cells.framebuffers[level], smaller_tx=cells.levels[level - 1])

@@ -40,6 +40,7 @@ class SamplingVariant:
         kernel = kernel_constants(self.kernel)
         yield self.over_balls("density", f"{FOLDER}/density.frag", **kernel)
         yield self.over_balls("gather", f"{FOLDER}/gather.frag", **kernel, **attributes)
+        yield self.over_balls("barrier", "lib/kernel_sphere.frag", KERNEL_SPHERES=1, BALL_CULLING=0)
         if "ball" in self.attributes:
             yield self.over_balls("dominant", f"{FOLDER}/dominant.frag", **kernel)
         for name in ("begin", "start", "count", "guess", "narrow", "found"):
@@ -49,12 +50,12 @@ class SamplingVariant:
         yield over_screen("cells_from_cells", "lib/cells_from_cells.frag")
 
     def over_balls(self, name: str, fragment: str, **constants: object) -> ProgramSource:
-        """A program that draws each ball's rectangle; with the constant WITH_NEAREST=0 also of those behind all samples."""
+        """A program that draws each ball's rectangle."""
         drawn = {
             "BALL_TEXTURE_WIDTH": BALL_TEXTURE_WIDTH,
             "TIGHT_RECTANGLES": 1,
             "BALL_CULLING": int(self.ball_culling),
-            "WITH_NEAREST": 1,
+            "KERNEL_SPHERES": 0,
             "CELL_SIZE": CELL_SIZE,
             "CELL_FACTOR": CELL_FACTOR,
         }

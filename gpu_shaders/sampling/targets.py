@@ -20,6 +20,9 @@ class SamplingTargets:
         Of densities at the samples; of the gradient, and of each attribute that is summed.
     side
         On which side of the surface the rays start, see lib/sampling/start.frag; `start` draws into it.
+    barrier
+        Scaled distances of the nearest kernel spheres, 1 where there is none: the surface is not behind, if the ray starts
+        outside and no ball has a negative weight. `bar` draws into it.
     brackets
         Two, see lib/sampling/bracket.glsl: `narrow` draws into one while the other is read.
     """
@@ -36,6 +39,8 @@ class SamplingTargets:
         self.depth = context.depth_texture(size)
         self.sums = [floats(4) for _ in range(1 + summed)]
         self.side = floats(2)
+        self.barrier = context.depth_texture(size)
+        self.bar = gl.framebuffer([], self.barrier)
         self.brackets = [floats(4) for _ in range(2)]
         self.dominant = plain(gl.texture(size, 1, dtype="u4"))
         self.ask = gl.framebuffer([self.samples], self.depth)

@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> None:
     if options.pictures:
         save_pictures()
         return
-    about = machine.describe()
+    about = machine.describe() | {"gl_renderer": gpu().shared_context().renderer}
     print(about["warning"], flush=True)
     tables = [
         frames_table(options.balls, options.repeats),

@@ -31,15 +31,18 @@ def stack(side, layers, spacing=0.5):
     return meniscus.Balls(np.stack([x, y, z], -1).reshape(-1, 3), 0.61)
 
 
+def density(balls, points):
+    """Of Mishima's kernel at (N, 3) points."""
+    s = np.linalg.norm(points[:, None] - balls.positions.astype(np.float64), axis=-1) / balls.radii
+    return (balls.weights * np.square(np.maximum(1 - s, 0))).sum(-1)
+
+
 def along_rays(balls, field, origins, directions, far, steps):
     """First distance at which the density passes the threshold, on `steps` samples in double precision and then by bisection;
     and the greatest density of each ray."""
-    positions, radii = balls.positions.astype(np.float64), balls.radii.astype(np.float64)
 
     def densities(index, t):
-        points = origins[index] + np.multiply.outer(t, directions[index])
-        s = np.linalg.norm(points[:, None] - positions, axis=-1) / radii
-        return (balls.weights * np.square(np.maximum(1 - s, 0))).sum(-1)
+        return density(balls, origins[index] + np.multiply.outer(t, directions[index]))
 
     first, highest = np.full(len(origins), np.inf), np.zeros(len(origins))
     t = np.linspace(0, far, steps)
@@ -77,6 +80,13 @@ def test_mishimas_kernel_against_dense_samples_in_double_precision(projection):
     assert both.sum() > 150
     assert np.count_nonzero(decidable & (np.isfinite(t) != np.isfinite(want))) <= 1
     assert np.quantile(np.abs(t[both] - want[both]), 0.998) < 1e-3
+    # Against the gradient of the sum, by its differences.
+    points = (origins + want[:, None] * view_directions / stretch[:, None] @ rotation.T)[both]
+    steps = np.eye(3) * 1e-5
+    slopes = np.stack([density(balls, points + step) - density(balls, points - step) for step in steps], -1)
+    normals = -slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+    tilt = np.einsum("ij,ij->i", normals, image["normal"].reshape(-1, 3)[both])
+    assert np.quantile(tilt, 0.02) > np.cos(np.radians(1))
 
 
 def test_a_lone_ball_of_mishimas_kernel_is_a_sphere_of_its_isolated_radius():

@@ -1,5 +1,5 @@
-// Two triangles around each ball, at the depth of its nearest point. A ball that reaches no sample of the pixels around it is not
-// drawn (Mishima et al. 2008, section 4.3): its corners fall together. WITH_NEAREST: one that begins behind all of them neither.
+// Two triangles around each ball, at the depth of its nearest point; with KERNEL_SPHERES around its kernel sphere. A ball that
+// reaches no distance that the pixels around it ask for is not drawn (Mishima et al. 2008, section 4.3): its corners fall together.
 #include "lib/ball.glsl"
 #include "lib/sphere_bounds.glsl"
 #include "lib/triangles.glsl"
@@ -24,11 +24,7 @@ bool is_asked_for(vec4 rectangle, float nearest, float farthest) {
     for (int y = 0; y < CELLS_ACROSS; y++)
         for (int x = 0; x < CELLS_ACROSS; x++)
             range = range_join(range, cell_range(level, min(cells.xy + ivec2(x, y), cells.zw)));
-#if WITH_NEAREST
     return !range_is_empty(range) && farthest >= range.x && nearest <= range.y;
-#else
-    return !range_is_empty(range) && farthest >= range.x;
-#endif
 }
 
 void main() {
@@ -36,12 +32,17 @@ void main() {
     Ball ball = ball_fetch(v_id);
     v_density = ball_density(v_id);
     v_sphere = vec4(ball.center, ball.radius);
-    vec4 rectangle = sphere_rectangle(ball.center, ball.radius);
-    float nearest = sphere_nearest(ball.center, ball.radius) * depth_scale;
-    bool is_drawn = all(lessThan(rectangle.xy, rectangle.zw));
+#if KERNEL_SPHERES
+    float radius = v_density.y;
+#else
+    float radius = ball.radius;
+#endif
+    vec4 rectangle = sphere_rectangle(ball.center, radius);
+    float nearest = sphere_nearest(ball.center, radius) * depth_scale;
+    bool is_drawn = radius > 0.0 && all(lessThan(rectangle.xy, rectangle.zw));
 #if BALL_CULLING
     if (is_drawn)
-        is_drawn = is_asked_for(rectangle, nearest, sphere_farthest(ball.center, ball.radius) * depth_scale);
+        is_drawn = is_asked_for(rectangle, nearest, sphere_farthest(ball.center, radius) * depth_scale);
 #endif
     vec2 corner = is_drawn ? square_corner(gl_VertexID % 6) : vec2(0.0);
     vec2 position = mix(rectangle.xy, rectangle.zw, corner) / image_middle - 1.0;

@@ -60,7 +60,7 @@ class Variant:
     def _on_all_balls(self) -> Iterator[ProgramSource]:
         """Draw each ball's rectangle."""
         constants = {**self._balls(), "FROM_PAIRS": 0}
-        yield _program("kernel", "sphere", "kernel", **constants, KERNEL_SPHERES=1, STARTS_ONLY=0)
+        yield _program("kernel", "sphere", "kernel_sphere", **constants, KERNEL_SPHERES=1, STARTS_ONLY=0)
         if self.with_starts:
             kernel = kernel_constants(self.kernel)
             yield _program("start", "sphere", "start", **constants, **kernel, KERNEL_SPHERES=0, STARTS_ONLY=1)
@@ -122,8 +122,9 @@ def all_programs() -> Iterator[ProgramSource]:
 
 
 def _program(name: str, vertex: str, fragment: str, **constants: object) -> ProgramSource:
-    folder = "lib" if vertex == "screen" else FOLDER
-    files = f"{folder}/{vertex}.vert", f"{FOLDER}/{fragment}.frag"
+    vertex_folder = "lib" if vertex == "screen" else FOLDER
+    fragment_folder = "lib" if fragment == "kernel_sphere" else FOLDER
+    files = f"{vertex_folder}/{vertex}.vert", f"{fragment_folder}/{fragment}.frag"
     return ProgramSource(name, *files, constants=tuple(sorted(constants.items())))
 
 

@@ -15,6 +15,8 @@ What differs from the paper, and why:
   weight asks behind its centre, and so do all others for a ray that starts in the fluid and looks for its way out. So the half
   that is left out never has a crossing that is looked for.
 - The interval is that of the smallest ball that asks, and a stretch of samples ends where a smaller one begins.
+- Where no ball has a negative weight, balls that begin behind the nearest kernel sphere (Kanamori et al. 2008, section 5.2) are
+  not asked where a ray may go on: it ends before.
 - Where the limit leaves rays without an answer they are counted. With the adaptive interval, the authors' proposal for crowded
   places, no ray is left before it has taken GRACE times the limit.
 """

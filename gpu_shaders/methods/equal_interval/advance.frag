@@ -10,6 +10,7 @@ uniform sampler2D bracket_tx;
 uniform sampler2D samples_tx;
 uniform sampler2D density_sum_tx;
 uniform sampler2D side_tx;
+uniform sampler2D barrier_tx;
 uniform float threshold;
 uniform int most_samples;
 uniform bool is_adaptive;
@@ -97,10 +98,11 @@ void look(inout March march, inout Past past, vec4 samples, vec4 values) {
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     March march = march_unpack(texelFetch(march_tx, pixel, 0));
+    vec2 side = texelFetch(side_tx, pixel, 0).xy;
     out_bracket = texelFetch(bracket_tx, pixel, 0);
     if (march.status == GOING || march.status == LOOKING) {
         vec4 samples = texelFetch(samples_tx, pixel, 0);
-        vec4 values = texelFetch(side_tx, pixel, 0).x * (texelFetch(density_sum_tx, pixel, 0) - threshold);
+        vec4 values = side.x * (texelFetch(density_sum_tx, pixel, 0) - threshold);
         Past past = past_unpack(out_bracket);
         if (!samples_asked(samples))
             march.status = MISSED;
@@ -112,5 +114,5 @@ void main() {
             out_bracket = past_pack(past);
     }
     out_march = march_pack(march);
-    gl_FragDepth = march_depth(march);
+    gl_FragDepth = march_depth(march, side, texelFetch(barrier_tx, pixel, 0).x, depth_scale);
 }

@@ -101,6 +101,7 @@ class Frame:
         """Four samples for each ray that still goes; balls are only drawn where there is one, which `query` learns."""
         passes, targets = self._passes, self._targets
         march = targets.marches[passes.now]
+        passes.measure("cells_from_march", march_tx=march, depth_tx=targets.shared.depth)
         targets.ahead.clear(_NOTHING_AHEAD, _NOTHING_AHEAD, _NOTHING_AHEAD, 0.0)
         with nullcontext() if previous is None else previous.required():
             passes.blend(moderngl.MIN, moderngl.FUNC_ADD)

@@ -23,9 +23,11 @@ vec4 march_pack(March march) {
     return vec4(march.t, march.value, march.asked, float(march.used << 3 | march.status));
 }
 
-// What a depth buffer holds of it: at rays that do not go on all balls fail the test.
-float march_depth(March march) {
-    return march.status == GOING ? 1.0 : 0.0;
+// What a depth buffer holds of it: at rays that do not go on all balls fail the test, at others those that begin behind a kernel
+// sphere, which the ray cannot pass unseen but where it grazes it. `barrier`: see targets.py.
+float march_depth(March march, vec2 side, float barrier, float depth_scale) {
+    bool is_barred = side.x > 0.0 && march.asked * depth_scale < barrier;
+    return march.status != GOING ? 0.0 : is_barred ? barrier : 1.0;
 }
 
 // Until there is a bracket, its place tells of the sample before the last one; and where the ray looks for a peak.

@@ -54,6 +54,7 @@ class EqualInterval(SamplingMethod):
             "is_adaptive": bool(settings["adaptive"]),
         }
         passes.bind(seen.textures, uniforms)
+        passes.find_barriers(may_carve=bool(np.any(seen.balls.weights < 0)))
         passes.start(seen.distances.with_starts, request.field.threshold)
         watch = partial(request.watch, 0.0)
         counts = Frame(passes, self._targets, seen.workspace.queries, settings, watch).march()

@@ -7,6 +7,7 @@ from itertools import combinations, product
 
 from ....addon.fluid.kernels import KERNELS
 from ....addon.render.method import ATTRIBUTES
+from ...image_cells import CELL_SIZE
 from ...programs import ProgramSource
 from ...sampling.programs import SamplingVariant, over_screen
 
@@ -16,7 +17,8 @@ FOLDER = "methods/equal_interval"
 def programs_of(variant: SamplingVariant) -> Iterator[ProgramSource]:
     """The programs of a frame."""
     yield from variant.programs()
-    yield variant.over_balls("next", f"{FOLDER}/next.frag", WITH_NEAREST=0)
+    yield variant.over_balls("next", f"{FOLDER}/next.frag")
+    yield over_screen("cells_from_march", f"{FOLDER}/cells_from_march.frag", CELL_SIZE=CELL_SIZE)
     for name in ("begin_march", "place", "advance", "unfinished"):
         yield over_screen(name, f"{FOLDER}/{name}.frag")
 
