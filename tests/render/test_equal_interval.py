@@ -81,7 +81,7 @@ def test_mishimas_kernel_against_dense_samples_in_double_precision(projection):
     assert np.count_nonzero(decidable & (np.isfinite(t) != np.isfinite(want))) <= 1
     assert np.quantile(np.abs(t[both] - want[both]), 0.998) < 1e-3
     # Against the gradient of the sum, by its differences.
-    points = (origins + want[:, None] * view_directions / stretch[:, None] @ rotation.T)[both]
+    points = origins[both] + want[both, None] * (view_directions / stretch[:, None] @ rotation.T)[both]
     steps = np.eye(3) * 1e-5
     slopes = np.stack([density(balls, points + step) - density(balls, points - step) for step in steps], -1)
     normals = -slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
