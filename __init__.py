@@ -15,6 +15,7 @@ _HOMES = {
     "Balls": ".addon.fluid.balls",
     "Camera": ".addon.fluid.camera",
     "DeepImage": ".addon.fluid.deep_image",
+    "DensityProfile": ".addon.fluid.density_profile",
     "Field": ".addon.fluid.field",
     "find_clusters": ".addon.render.clusters",
     "FittedBvh": ".addon.render.fitted_bvh",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .density_profile import DensityProfile
 from .errors import InputError
 from .kernels import KERNELS, Kernel, PolynomialKernel
 
@@ -19,7 +20,7 @@ class Field:
     Parameters
     ----------
     kernel
-        Name of a density kernel, see :data:`kernels.KERNELS`.
+        Name of a density kernel, see :data:`kernels.KERNELS`; or a kernel of one's own.
     isovalue
         The threshold T, greater than 0. A lone ball of weight 1 is visible for T < 1.
 
@@ -29,11 +30,11 @@ class Field:
         The kernel is unknown or the isovalue is not a positive finite number.
     """
 
-    kernel: str = "wyvill"
+    kernel: str | DensityProfile = "wyvill"
     isovalue: float = 0.2
 
     def __post_init__(self) -> None:
-        if self.kernel not in KERNELS:
+        if not isinstance(self.kernel, DensityProfile) and self.kernel not in KERNELS:
             raise InputError(f"Unknown kernel '{self.kernel}': choose one of {', '.join(KERNELS)}")
         if not (math.isfinite(self.isovalue) and self.isovalue > 0):
             raise InputError(f"The isovalue must be a positive number, not {self.isovalue}")
@@ -41,7 +42,7 @@ class Field:
     @property
     def density_kernel(self) -> Kernel:
         """The kernel itself."""
-        return KERNELS[self.kernel]
+        return self.kernel if isinstance(self.kernel, DensityProfile) else KERNELS[self.kernel]
 
     @property
     def polynomial_kernel(self) -> PolynomialKernel:

@@ -1,7 +1,8 @@
 // The density kernels; of those that are polynomials also how fast their slopes change, and the polynomials over an interval of a
 // ray in Bernstein form.
 // With KERNEL_IS_POLYNOMIAL f(x) = x^KERNEL_POWER (KERNEL_LOW + KERNEL_HIGH x); KERNEL_DEGREE: 2, 4, 6 or 8, its degree along a
-// ray. Else f(x) = (1 - s)^2 with s = sqrt(1 - x) (Mishima et al. 2008, equation 7).
+// ray. With KERNEL_IS_PROFILE f is linear between the entries of a table, at even steps of s = sqrt(1 - x). Else it is (1 - s)^2
+// (Mishima et al. 2008, equation 7).
 #include "lib/chord.glsl"
 
 #if KERNEL_IS_POLYNOMIAL
@@ -103,6 +104,32 @@ void kernel_add_bernstein(inout float total[KERNEL_DEGREE + 1], Chord chord, flo
     total[8] += weight * s4 * s4;
 #endif
 #endif
+}
+
+#elif KERNEL_IS_PROFILE
+
+uniform sampler2D profile_tx;
+
+// The densities of the entries around s, and how far it lies behind the first.
+vec3 kernel_entries(float s) {
+    int last = textureSize(profile_tx, 0).x - 1;
+    int entry = clamp(int(s * float(last)), 0, last - 1);
+    float begin = texelFetch(profile_tx, ivec2(entry, 0), 0).x, end = texelFetch(profile_tx, ivec2(entry + 1, 0), 0).x;
+    return vec3(begin, end, s * float(last) - float(entry));
+}
+
+float kernel_value(float x) {
+    if (x <= 0.0)
+        return 0.0;
+    vec3 entries = kernel_entries(sqrt(max(1.0 - x, 0.0)));
+    return mix(entries.x, entries.y, entries.z);
+}
+
+float kernel_derivative(float x) {
+    float s = sqrt(max(1.0 - x, 0.0));
+    vec3 entries = kernel_entries(s);
+    float steps = float(textureSize(profile_tx, 0).x - 1);
+    return x <= 0.0 ? 0.0 : (entries.x - entries.y) * steps / (2.0 * max(s, KERNEL_LEAST_SHARE));
 }
 
 #else

@@ -15,6 +15,7 @@ from ...addon.render.method import Attribute, MethodInfo, Request, Surface, time
 from ..ball_textures import BALL_TEXTURE_WIDTH, BallDistances, ball_textures
 from ..camera_parts import camera_uniforms, image_parts
 from ..context import GpuContext
+from ..kernel_constants import kernel_textures
 from ..surface_textures import SurfaceTextures
 from .passes import SamplingWorkspace
 
@@ -35,7 +36,7 @@ class SeenBalls:
     attributes
         What is found beside depth and normal.
     textures
-        The balls' own, by sampler name.
+        The balls' own and the kernel's, by sampler name.
     workspace
         What is kept from frame to frame.
     """
@@ -145,7 +146,11 @@ class SamplingMethod(ABC):
     def _uploaded(self, request: Request, balls: ViewBalls) -> SeenBalls:
         self._workspace = self._workspace or SamplingWorkspace(self._context)
         attributes = request.known_attributes
-        textures = ball_textures(self._context.gl, balls, attributes, request.balls.velocities)
+        gl = self._context.gl
+        textures = {
+            **ball_textures(gl, balls, attributes, request.balls.velocities),
+            **kernel_textures(gl, request.field.density_kernel),
+        }
         return SeenBalls(balls, BallDistances.measure(balls, request.camera), attributes, textures, self._workspace)
 
     def _parts(self, request: Request) -> list[Region]:

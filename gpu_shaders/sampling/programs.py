@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ...addon.fluid.kernels import Kernel
+from ...addon.fluid.density_profile import DensityProfile
+from ...addon.fluid.kernels import KERNELS, Kernel
 from ...addon.fluid.passes import DEPTH_BACKGROUND
 from ...addon.render.method import Attribute
 from ..ball_textures import BALL_TEXTURE_WIDTH
@@ -14,6 +15,8 @@ from ..kernel_constants import kernel_constants
 from ..programs import ProgramSource
 
 FOLDER = "lib/sampling"
+ANY_KERNEL: tuple[Kernel, ...] = (*KERNELS.values(), DensityProfile([1, 0]))
+"""Of each kind that programs differ by; all tables are one."""
 
 
 @dataclass(frozen=True)

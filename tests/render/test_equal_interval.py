@@ -103,6 +103,25 @@ def test_a_lone_ball_of_mishimas_kernel_is_a_sphere_of_its_isolated_radius():
     np.testing.assert_allclose(image["normal"][inner], outward, atol=3e-3)
 
 
+def test_a_table_of_densities_draws_as_the_kernel_that_it_is_of():
+    scene = SCENES["negative_weights"]()
+    camera = scene.camera("perspective")
+    kernel = scene.field.density_kernel
+    table = meniscus.DensityProfile(kernel.value(1 - np.linspace(0, 1, 1024) ** 2))
+    named, tabled = (
+        meniscus.render(scene.balls, camera, meniscus.Field(own, scene.field.isovalue), method="equal_interval")
+        for own in (scene.field.kernel, table)
+    )
+    assert np.count_nonzero(named.hit != tabled.hit) <= 3
+    both = named.hit & tabled.hit
+    np.testing.assert_allclose(tabled["depth"][both], named["depth"][both], atol=2e-3)
+    assert np.mean(np.abs(tabled["normal"] - named["normal"]).max(-1)[both] > 0.02) < 2e-3
+    # Another table of another length, by the same programs.
+    blunt = meniscus.render(scene.balls, camera, meniscus.Field(meniscus.DensityProfile([1, 1, 0]), 0.2))
+    assert blunt.info.method == "equal_interval"
+    assert blunt.hit.sum() > tabled.hit.sum()
+
+
 def errors(scene, camera, **settings):
     """|dt| / R of the pixels that look straight at a ball's middle part."""
     image = image_of(scene, camera, **settings)

@@ -84,6 +84,40 @@ def test_steepest_slope_is_that_of_the_kernel_by_distance(name):
     assert np.max(steps) == pytest.approx(KERNELS[name].steepest_slope, rel=1e-3)
 
 
+def test_a_density_profile_is_the_kernel_that_its_table_is_of():
+    exact = KERNELS["wyvill"]
+    profile = meniscus.DensityProfile(exact.value(1 - np.linspace(0, 1, 1001) ** 2))
+    assert profile == meniscus.DensityProfile(profile.densities)
+    assert hash(meniscus.Field(profile)) == hash(meniscus.Field(meniscus.DensityProfile(profile.densities)))
+    np.testing.assert_allclose(profile.value(X), exact.value(X), atol=1e-5)
+    np.testing.assert_allclose(profile.derivative(X[10:-10]), exact.derivative(X[10:-10]), rtol=0.02, atol=5e-3)
+    np.testing.assert_allclose(profile.value(profile.inverse(X)), X, atol=1e-12)
+    assert np.isnan(profile.inverse(np.array([-0.1, 1.1]))).all()
+    assert profile.content == pytest.approx(exact.content, rel=1e-5)
+    assert profile.steepest_slope == pytest.approx(exact.steepest_slope, rel=1e-4)
+    radii = [meniscus.Field(own, 0.3).kernel_radii(np.ones(1), np.array([2.0]))[0] for own in ("wyvill", profile)]
+    assert radii[1] == pytest.approx(radii[0], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("densities", "reason"),
+    [
+        ([1.0, 0.5, 0.1], "end at 0"),
+        ([1.0, np.nan, 0.0], "finite"),
+        ([1.0, np.inf, 0.0], "finite"),
+        ([0.5, 1.0, 0.0], "fall"),
+        ([0.0, 0.0], "fall"),
+        ([0.0], "2 to 1024"),
+        (np.linspace(1, 0, 1025), "2 to 1024"),
+        ([[1.0, 0.0]], "2 to 1024"),
+        (["much", "nothing"], "numbers"),
+    ],
+)
+def test_unusable_density_profiles_are_refused(densities, reason):
+    with pytest.raises(InputError, match=reason):
+        meniscus.DensityProfile(densities)
+
+
 @pytest.mark.parametrize("use", [lambda field: native.fluid_arguments(BALL, field), lambda field: field.polynomial_kernel])
 def test_a_kernel_that_is_no_polynomial_is_refused_where_one_is_needed(use):
     with pytest.raises(InputError, match="Mishima is no polynomial"):

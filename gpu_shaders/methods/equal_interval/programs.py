@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS
 from ....addon.render.method import ATTRIBUTES
 from ...image_cells import CELL_SIZE
 from ...programs import ProgramSource
-from ...sampling.programs import SamplingVariant, over_screen
+from ...sampling.programs import ANY_KERNEL, SamplingVariant, over_screen
 
 FOLDER = "methods/equal_interval"
 
@@ -26,5 +25,5 @@ def programs_of(variant: SamplingVariant) -> Iterator[ProgramSource]:
 def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     subsets = [chosen for count in range(4) for chosen in combinations(ATTRIBUTES, count)]
-    for kernel, attributes, culling in product(KERNELS.values(), subsets, (False, True)):
+    for kernel, attributes, culling in product(ANY_KERNEL, subsets, (False, True)):
         yield from programs_of(SamplingVariant(kernel, attributes, culling))
