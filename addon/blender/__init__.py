@@ -8,6 +8,7 @@ from types import ModuleType
 
 _SUBMODULES = (
     "properties",
+    "method_settings",
     "preferences",
     "version_update",
     "operators",

@@ -17,6 +17,7 @@ import bpy
 from ..fluid.errors import InputError, MeniscusError
 from ..output.whole_file import whole_file
 from .command_line_arguments import parse_arguments
+from .method_settings import read_choice
 from .output_pattern import output_pattern
 from .render_frames import FrameReport, RenderJob, frames_of, render_frames
 from .render_scene import RenderSettings
@@ -88,8 +89,7 @@ def _job(options: argparse.Namespace) -> RenderJob:
         view_layer,
         passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
         samples=options.samples,
-        method=options.method,
-        backend=options.backend,
+        choice=read_choice(scene, options.method, options.backend).unhurried.with_written(options.setting),
         camera=_camera(scene, options.camera),
         resolution=options.resolution,
         tracing={

@@ -100,6 +100,14 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
             f"--{name}", type=whole_number, metavar="N", help=f"{what}, with ray tracing; the scene's number if left out"
         )
     render.add_argument("--method", metavar="NAME", help="how the surface is found; the scene's choice if left out")
+    render.add_argument(
+        "--setting",
+        action="append",
+        type=named_value,
+        default=[],
+        metavar="NAME=VALUE",
+        help="of the method, may be given several times; the scene's settings of the method if left out",
+    )
     render.add_argument("--backend", metavar="NAME", help="auto, gpu or cpu; the scene's choice if left out")
     render.add_argument("--compression", choices=COMPRESSIONS, default="ZIP", help="all lossless; ZIP if left out")
     render.add_argument(
@@ -167,6 +175,14 @@ def whole_number(text: str) -> int:
     if not re.fullmatch(r"\d+", text):
         raise argparse.ArgumentTypeError(f"'{text}' is no whole number; write 0 or more")
     return int(text)
+
+
+def named_value(text: str) -> tuple[str, str]:
+    """Name and value from ``name=value``."""
+    name, sign, value = text.partition("=")
+    if not (name.strip() and sign and value.strip()):
+        raise argparse.ArgumentTypeError(f"'{text}' is no setting; write NAME=VALUE")
+    return name.strip(), value.strip()
 
 
 def pass_names(text: str) -> tuple[str, ...]:

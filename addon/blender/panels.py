@@ -14,6 +14,7 @@ from ..fluid.look import LOOK_STYLES
 from ..fluid.passes import PASSES
 from .compositing import fluid_scene_of
 from .engine_name import ENGINE
+from .method_settings import group_of
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
 from .texture_sharing import SHARING
@@ -432,8 +433,13 @@ def _draw_color(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
 
 def _draw_surface(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     layout = _split(layout)
-    for name in ("kernel", "isovalue", "method", "backend"):
+    for name in ("kernel", "isovalue", "method"):
         layout.prop(settings, name)
+    group = group_of(settings, settings.method)
+    if group is not None:
+        for name in group.__annotations__:
+            layout.prop(group, name)
+    layout.prop(settings, "backend")
 
 
 def _draw_look(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -27,6 +27,7 @@ from ..render.backdrop import Surroundings
 from ..render.deep import render_deep
 from ..render.image_memory import ImageMemory
 from ..render.method import timed
+from ..render.method_choice import MethodChoice
 from ..render.pass_images import needed_attributes
 from ..render.renderer import render
 from ..render.sample_mean import SampleMean
@@ -34,8 +35,9 @@ from ..render.samples import sample_offset
 from ..render.surroundings import Backdrop, Motion
 from .ball_part import FloatArray
 from .fluid_motion import needs_neighbors, with_motion
+from .method_settings import read_choice
 from .moving import may_move
-from .preferences import backend_of, threads_of
+from .preferences import threads_of
 from .read_camera import read_camera
 from .read_lighting import read_lighting
 from .read_meshes import read_meshes, read_moved_vertices
@@ -62,7 +64,9 @@ class RenderSettings:
         How many objects a pixel names in the mattes; 0 for no mattes.
     samples
         A pixel's, of the antialiased passes.
-    method, backend, threads
+    choice
+        Of the method, see :class:`method_choice.MethodChoice`.
+    threads
         See :func:`renderer.render`.
     camera
         None for the scene's.
@@ -75,8 +79,7 @@ class RenderSettings:
     passes: tuple[str, ...]
     cryptomatte_levels: int = 0
     samples: int = 1
-    method: str = "auto"
-    backend: str = "auto"
+    choice: MethodChoice = MethodChoice()
     threads: int = 0
     camera: bpy.types.Object | None = None
     resolution: tuple[int, int] | None = None
@@ -89,8 +92,7 @@ class RenderSettings:
             "passes": tuple(image_pass.name for image_pass in wanted_passes(view_layer)),
             "cryptomatte_levels": cryptomatte_levels(view_layer),
             "samples": scene.meniscus.render_samples,
-            "method": scene.meniscus.method,
-            "backend": backend_of(scene),
+            "choice": read_choice(scene).unhurried,
             "threads": threads_of(scene),
         }
         return cls(**{**own, **{name: choice for name, choice in choices.items() if choice is not None}})
@@ -206,8 +208,7 @@ class SceneRender:
             moment.fluid.balls,
             moment.camera,
             moment.field,
-            method=settings.method,
-            backend=settings.backend,
+            **settings.choice.options,
             look=moment.look,
             is_cancelled=control.is_cancelled,
             threads=settings.threads,
@@ -227,8 +228,7 @@ class SceneRender:
             moment.fluid.balls,
             camera,
             moment.field,
-            method=self.settings.method,
-            backend=self.settings.backend,
+            **self.settings.choice.options,
             passes=passes,
             look=moment.look,
             is_cancelled=control.is_cancelled,

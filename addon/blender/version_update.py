@@ -37,7 +37,8 @@ def update_scene(scene: bpy.types.Scene) -> None:
 
 
 def _was_used(scene: bpy.types.Scene) -> bool:
-    names = {item.identifier for item in scene.meniscus.bl_rna.properties} - {"rna_type", "name", "version", "source_index"}
+    values = {item.identifier for item in scene.meniscus.bl_rna.properties if item.type != "POINTER"}
+    names = values - {"name", "version", "source_index"}
     return any(scene.meniscus.is_property_set(name) for name in names)
 
 

@@ -28,7 +28,8 @@ from ..render.method import timed
 from .changes import CHANGES
 from .engine_name import is_engine_view
 from .legend import draw_legend
-from .preferences import backend_of, preferences
+from .method_settings import read_choice
+from .preferences import preferences
 from .presenter import UNCHANGED, Place, Presenter
 from .read_lighting import read_lighting
 from .read_scene import read_field, read_look
@@ -189,7 +190,7 @@ class ViewportDrawing:
             viewport.drawn = viewport.live.revision
             return
         view = _view(context.scene, balls, seen, look, surroundings)
-        if view.backend != "cpu":
+        if view.choice.backend != "cpu":
             SHARING.begin()
         viewport.live.show(view)
         viewport.live.wait(LONGEST_WAIT - (time.monotonic() - started))
@@ -294,8 +295,7 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look, su
         else None,
         look=look if style.uses_scene else None,
         surroundings=surroundings,
-        method=settings.method,
-        backend=backend_of(scene),
+        choice=read_choice(scene),
         threads=chosen.threads,
         samples=settings.preview_samples,
         frame_rate=settings.preview_frame_rate,

@@ -25,6 +25,7 @@ from .backdrop import Surroundings
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
+from .method_choice import MethodChoice
 from .pace import Pace
 from .renderer import prepare, render_to_show, watch_of
 from .samples import sample_offset
@@ -57,7 +58,9 @@ class View:
         Colours and light of the Combined pass; None where it is not among the passes.
     surroundings
         What else there is in the scene; None where the look knows nothing of that.
-    method, backend, threads
+    choice
+        Of the method; what it has to hold a pace with counts while views change.
+    threads
         As for :func:`renderer.render`.
     samples
         How many samples a pixel gets at last, 1 for no antialiasing.
@@ -75,8 +78,7 @@ class View:
     contrast_radius: float | None = None
     look: Look | None = None
     surroundings: Surroundings | None = None
-    method: str = "auto"
-    backend: str = "auto"
+    choice: MethodChoice = MethodChoice()
     threads: int = 0
     samples: int = 8
     frame_rate: float = 24.0
@@ -94,8 +96,13 @@ class View:
     def _means(self) -> tuple[object, ...]:
         return (
             *(self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.surroundings),
-            *(self.method, self.backend),
+            self.choice,
         )
+
+    @property
+    def hurries(self) -> bool:
+        """Whether what is shown while views change is another picture than what rests."""
+        return self.look_while_moving != self.look or self.choice != self.choice.unhurried
 
     @property
     def look_while_moving(self) -> Look | None:
@@ -181,7 +188,7 @@ class LiveView:
             self._changed.notify_all()
         if is_next:
             # The thread may still draw what was asked for before.
-            self._prepare(view.balls, view.field, view.method, view.backend, view.threads)
+            self._prepare(view.balls, view.field, view.choice.method, view.choice.backend, view.threads)
 
     def wait(self, seconds: float) -> bool:
         """Wait until there is a picture of the view that was asked for last, or a failure; whether that came in time."""
@@ -258,7 +265,7 @@ class LiveView:
 
     def _accept(self, picture: Picture, seconds: float) -> None:
         camera = picture.image.camera
-        if picture.is_hurried or picture.view.look_while_moving == picture.view.look:
+        if picture.is_hurried or not picture.view.hurries:
             self._pace.note(camera.width * camera.height, seconds)
         is_next = self._is_current() and not picture.is_hurried and not self._is_coarse
         self._pictures = [*self._pictures, picture] if is_next else [picture]
@@ -331,7 +338,7 @@ class LiveRenderer:
     def _make_picture(self, live: LiveView, view: View, camera: Camera, sample: int, is_first: bool) -> None:
         # A first picture is finished whatever comes: else a viewport that changes all the time would show nothing.
         is_cancelled = (lambda: self._is_closed) if is_first else lambda: self._is_overtaken(live, view)
-        look = view.look_while_moving if is_first else view.look
+        look, choice = (view.look_while_moving, view.choice) if is_first else (view.look, view.choice.unhurried)
         milliseconds: dict[str, float] = {}
         try:
             with timed(milliseconds, "picture"):
@@ -339,8 +346,7 @@ class LiveRenderer:
                     view.balls,
                     camera,
                     view.field,
-                    method=view.method,
-                    backend=view.backend,
+                    **choice.options,
                     passes=view.passes,
                     look=look,
                     is_cancelled=is_cancelled,
@@ -351,7 +357,7 @@ class LiveRenderer:
                     else view.surroundings.backdrop(camera, view.threads, watch_of(is_cancelled, None)),
                     sample=sample,
                 )
-                picture = _picture(image, view, is_hurried=look != view.look)
+                picture = _picture(image, view, is_hurried=is_first and view.hurries)
         except CancelledError:
             return
         except Exception as failure:  # noqa: BLE001 - whatever it is, the user sees it and the thread goes on

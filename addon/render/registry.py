@@ -68,6 +68,14 @@ def method_infos() -> list[MethodInfo]:
     return [_import(folder, "params").METHOD for folder in _FOLDERS]
 
 
+def method_info(name: str) -> MethodInfo:
+    """What the method called `name` is, without loading it; raises InputError where there is none."""
+    for info in method_infos():
+        if info.name == name:
+            return info
+    raise InputError(f"Unknown method '{name}': choose auto, {', '.join(info.name for info in method_infos())}")
+
+
 def methods() -> list[MethodStatus]:
     """All registered methods, in order of preference, and whether each runs here. Opens the GPU to find out."""
     return [MethodStatus(info, _problem(info)) for info in method_infos()]
@@ -83,13 +91,11 @@ def create_method(name: str) -> tuple[MethodInfo, Method]:
     DeviceError
         It cannot run on this machine.
     """
-    for folder in _FOLDERS:
-        info: MethodInfo = _import(folder, "params").METHOD
-        if info.name == name:
-            if info.backend == "gpu":
-                gpu()
-            return info, _import(folder, "method").create()
-    raise InputError(f"Unknown method '{name}': choose auto, {', '.join(info.name for info in method_infos())}")
+    info = method_info(name)
+    if info.backend == "gpu":
+        gpu()
+    folder = next(folder for folder in _FOLDERS if _import(folder, "params").METHOD.name == name)
+    return info, _import(folder, "method").create()
 
 
 def gpu() -> ModuleType:

@@ -219,7 +219,7 @@ class _Shot:
         if traces or "thickness" in names:
             _ = field.polynomial_kernel  # tells now what it would tell after the surface is found
         choice = _pick_method(method, backend, attributes, field)
-        checked = _settings_of(choice.info, method, settings)
+        checked = checked_settings(method, choice.info.settings, settings)
         watch = watch_of(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked)
         return cls(choice, request, camera, names, look)
@@ -266,12 +266,6 @@ class _Choice:
         """What traces light: the graphics processor where the method runs on one, else the native core."""
         is_hardware = self.info.backend == "gpu" and not runs_in_software_opengl(self.info)
         return trace_image_on_device if is_hardware else trace_image
-
-
-def _settings_of(info: MethodInfo, method: str, settings: Mapping[str, Value] | None) -> dict[str, Value]:
-    if method == "auto" and settings:
-        raise InputError("Settings belong to one method, and the method is automatic: choose the method too, or leave them out")
-    return checked_settings(f"The method '{info.name}'", info.settings, settings)
 
 
 def _pick_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field) -> _Choice:

@@ -11,6 +11,9 @@ from ..fluid.errors import InputError
 
 Value = bool | int | float
 
+_SWITCHES = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+"""How users write them."""
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -24,6 +27,9 @@ class Setting:
         A bool, an int or a float: the kind of all its values.
     minimum, maximum
         The range of its values, both ends included; of no meaning for a switch.
+    is_for_motion
+        Whether it only serves to hold a pace: in Blender it holds while a viewport moves, and nothing else is rendered with it
+        unless the command line says so.
     """
 
     name: str
@@ -32,6 +38,7 @@ class Setting:
     default: Value
     minimum: float = -math.inf
     maximum: float = math.inf
+    is_for_motion: bool = False
 
     def checked(self, value: object) -> Value:
         """The value, of the setting's kind; InputError where it is not, or is out of range."""
@@ -47,8 +54,7 @@ class Setting:
     def from_text(self, text: str) -> Value:
         """The value that a user has written; the errors are those of :meth:`checked`."""
         if isinstance(self.default, bool):
-            switches = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
-            return self.checked(switches.get(text.strip().lower(), text))
+            return self.checked(_SWITCHES.get(text.strip().lower(), text))
         kind = int if isinstance(self.default, int) else float
         try:
             return self.checked(kind(text))
@@ -79,13 +85,24 @@ class Setting:
         raise InputError(f"The setting '{self.name}' cannot be {value!r}: give {self.range}")
 
 
-def checked_settings(owner: str, known: Iterable[Setting], given: Mapping[str, object] | None) -> dict[str, Value]:
+def setting_of(method: str, known: Iterable[Setting], name: str) -> Setting:
+    """The setting of that name; InputError where the method has none, or is "auto"."""
+    if method == "auto":
+        raise InputError("Settings belong to one method, and the method is automatic: choose the method too, or leave them out")
+    by_name = {setting.name: setting for setting in known}
+    if name not in by_name:
+        choice = f"it has {', '.join(by_name)}" if by_name else "it has none"
+        raise InputError(f"The method '{method}' has no setting '{name}': {choice}")
+    return by_name[name]
+
+
+def checked_settings(method: str, known: Iterable[Setting], given: Mapping[str, object] | None) -> dict[str, Value]:
     """All settings of a method: those that are given, checked, and the defaults of the others.
 
     Parameters
     ----------
-    owner
-        The method, as messages call it.
+    method
+        As the user has named it.
     known, given
         What it has, and what is asked of it by name.
 
@@ -94,10 +111,6 @@ def checked_settings(owner: str, known: Iterable[Setting], given: Mapping[str, o
     InputError
         There is no such setting, or it cannot have that value.
     """
-    by_name = {setting.name: setting for setting in known}
-    given = given or {}
-    for name in given:
-        if name not in by_name:
-            choice = f"it has {', '.join(by_name)}" if by_name else "it has none"
-            raise InputError(f"{owner} has no setting '{name}': {choice}")
-    return {name: setting.checked(given[name]) if name in given else setting.default for name, setting in by_name.items()}
+    known = tuple(known)
+    checked = {name: setting_of(method, known, name).checked(value) for name, value in (given or {}).items()}
+    return {**{setting.name: setting.default for setting in known}, **checked}

@@ -38,11 +38,11 @@ def test_the_command_line_asks_its_arguments_then_the_scene_then_the_user(prefer
 
     chosen.backend, chosen.threads = "cpu", 3
     try:
-        assert (job().settings.backend, job("--backend", "gpu").settings.backend) == ("cpu", "gpu")
+        assert (job().settings.choice.backend, job("--backend", "gpu").settings.choice.backend) == ("cpu", "gpu")
         assert preferences.threads_of(scene) == 3
         scene.render.threads_mode, scene.render.threads = "FIXED", 2
         assert preferences.threads_of(scene) == 2
         scene.meniscus.backend = "gpu"
-        assert job().settings.backend == "gpu"
+        assert job().settings.choice.backend == "gpu"
     finally:
         chosen.backend, chosen.threads = "auto", 0

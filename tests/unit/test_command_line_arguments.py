@@ -44,16 +44,21 @@ def test_all_options_arrive() -> None:
             "--method",
             "depth_peeling",
         ),
+        *("--setting", "step=0.5", "--setting", "name = a=b"),
         *("--backend", "gpu", "--compression", "PIZ", "--view-layer", "Spray", "--preview", "--json", "-"),
     )
     assert (options.camera, options.resolution, options.passes) == ("Side Camera", (640, 480), ("normal", "depth"))
     assert (options.method, options.backend, options.compression) == ("depth_peeling", "gpu", "PIZ")
     assert (options.view_layer, options.preview, options.json) == ("Spray", True, "-")
+    assert options.setting == [("step", "0.5"), ("name", "a=b")]
 
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
+        (["--setting", "step"], "'step' is no setting; write NAME=VALUE"),
+        (["--setting", "=3"], "'=3' is no setting; write NAME=VALUE"),
+        (["--setting", "step="], "'step=' is no setting; write NAME=VALUE"),
         (["--frames", "10:1"], "the range '10:1' runs backwards; write 1:10"),
         (["--frames", "1:10:0"], "the step of '1:10:0' must be at least 1"),
         (["--frames", "1-10"], "'1-10' is no frame range; write N, FIRST:LAST or FIRST:LAST:STEP"),

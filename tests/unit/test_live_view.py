@@ -13,8 +13,11 @@ from meniscus.addon.fluid.errors import CancelledError, DeviceError
 from meniscus.addon.fluid.image import ImageBuffers, RenderInfo
 from meniscus.addon.fluid.tracing import Tracing
 from meniscus.addon.render.live_view import LiveRenderer, View
+from meniscus.addon.render.method_choice import MethodChoice
 from meniscus.addon.render.pace import Pace
 from meniscus.addon.render.samples import sample_offset
+from meniscus.addon.render.settings import Setting
+from meniscus.addon.render.tile_caster import params
 
 CAMERA = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=1000, height=600)
 BALLS = meniscus.Balls([[0, 0, 0], [0.5, 0, 0]], 0.9)
@@ -111,7 +114,8 @@ def test_the_same_view_is_not_rendered_again(renderer, fake):
         {"field": meniscus.Field(isovalue=0.3)},
         {"passes": ("depth", "normal", "velocity")},
         {"camera": meniscus.Camera.perspective((0, -5, 0), (0, 0, 0), width=1000, height=600)},
-        {"backend": "cpu"},
+        {"choice": MethodChoice(backend="cpu")},
+        {"choice": MethodChoice("fitted_bvh", settings={"step": 2})},
     ],
 )
 def test_whatever_changes_the_image_asks_for_a_new_one(renderer, fake, change):
@@ -248,7 +252,7 @@ def test_closing_does_not_wait_for_a_picture_under_way(fake):
 def test_real_pictures_are_those_of_the_renderer():
     renderer = LiveRenderer()
     live = renderer.open()
-    view = replace(VIEW, backend="cpu", samples=2, camera=CAMERA.resized(100, 60))
+    view = replace(VIEW, choice=MethodChoice(backend="cpu"), samples=2, camera=CAMERA.resized(100, 60))
     live.show(view)
     rest(live)
     renderer.close()
@@ -334,7 +338,7 @@ def test_what_the_next_balls_need_is_begun_while_the_last_are_drawn(fake):
         live.show(moved(VIEW, 1.0))
         assert fake.begun.wait(SOON)
         balls = meniscus.Balls([[0, 0, 1]], 0.9)
-        live.show(replace(VIEW, balls=balls, method="fitted_bvh"))
+        live.show(replace(VIEW, balls=balls, choice=MethodChoice("fitted_bvh")))
         assert asked == [(balls, VIEW.field, "fitted_bvh", "auto", 0)], "the thread is still busy"
     finally:
         fake.going.set()
@@ -355,3 +359,17 @@ def test_light_goes_less_far_while_a_view_moves(renderer, fake):
     assert asked == [(1, 2, 0), (3, 5, 0), (3, 5, 1), (3, 5, 2)]
     assert fake.widths == [100] * 4
     assert [picture.is_hurried for picture in live.pictures] == [False] * 3
+
+
+def test_what_holds_the_pace_counts_only_while_a_view_moves(renderer, fake, monkeypatch):
+    asked = []
+    renderer._render = lambda *arguments, settings, **names: asked.append(dict(settings)) or fake(*arguments, **names)
+    known = (Setting("step", "Step", "", 1, 1, 9), Setting("budget", "Budget", "", 0.0, is_for_motion=True))
+    monkeypatch.setattr(params, "METHOD", replace(params.METHOD, settings=known))
+    choice = MethodChoice("tile_caster", settings={"step": 3, "budget": 0.5})
+    live = renderer.open()
+    live.show(replace(VIEW, choice=choice, camera=CAMERA.resized(100, 60), samples=2))
+    rest(live)
+    assert asked == [{"step": 3, "budget": 0.5}, {"step": 3}, {"step": 3}]
+    assert fake.widths == [100] * 3
+    assert [picture.is_hurried for picture in live.pictures] == [False] * 2

@@ -12,8 +12,10 @@ import meniscus
 from meniscus.addon.fluid.errors import InputError
 from meniscus.addon.render import renderer
 from meniscus.addon.render.deep import render_deep
+from meniscus.addon.render.method_choice import MethodChoice
 from meniscus.addon.render.registry import method_infos
 from meniscus.addon.render.settings import Setting
+from meniscus.addon.render.tile_caster import params
 
 STEP = Setting("step", "Step", "Width of a step", 0.5, 0.1, 1.0)
 COUNT = Setting("count", "Count", "How many", 8, 1, 64)
@@ -131,6 +133,20 @@ def test_values_are_read_from_text(setting, text, value):
 def test_text_that_is_no_value_is_told_in_one_sentence(setting, text):
     with pytest.raises(InputError, match=f"^The setting '{setting.name}' .*: give "):
         setting.from_text(text)
+
+
+def test_a_choice_takes_what_a_user_writes(requests, monkeypatch):
+    monkeypatch.setattr(params, "METHOD", replace(params.METHOD, settings=(STEP, COUNT, SWITCH)))
+    choice = MethodChoice("tile_caster", settings={"count": 3, "step": 0.2}).with_written(
+        [("step", "0.25"), ("use_bisection", "no")]
+    )
+    assert choice.settings == {"count": 3, "step": 0.25, "use_bisection": False}
+    with pytest.raises(InputError, match="has no setting 'stride': it has step, count, use_bisection"):
+        choice.with_written([("stride", "1")])
+    with pytest.raises(InputError, match="the method is automatic"):
+        MethodChoice().with_written([("step", "1")])
+    with pytest.raises(InputError, match="Unknown method 'voxels'"):
+        MethodChoice("voxels").with_written([("step", "1")])
 
 
 def test_ranges_may_be_open():
