@@ -494,6 +494,8 @@ def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
     ]
     if "balls_drawn" in info.counts:
         lines.append(("Drawn", f"{info.counts['balls_drawn']:,}"))
+    if info.counts.get("unfinished"):
+        lines.append(("Unfinished", f"{info.counts['unfinished']:,} pixels"))
     lines += [
         (stage.replace("_", " ").title(), f"{time:.1f} ms") for stage, time in list(info.milliseconds.items())[:_STAGES_SHOWN]
     ]

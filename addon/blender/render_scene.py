@@ -198,7 +198,7 @@ class SceneRender:
         image = self._shot(self.moment, self.moment.camera, self.settings.first_passes, control, self.motion)
         self._antialias(image, control)
         image.info.milliseconds = {**self.milliseconds, **image.info.milliseconds}
-        image.info.notes = self.notes
+        image.info.notes = (*self.notes, *image.info.notes)
         return image
 
     def deep_image(self, control: Control) -> DeepImage:

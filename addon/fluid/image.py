@@ -31,7 +31,7 @@ class RenderInfo:
     dropped
         Unusable balls by reason, see :class:`Balls`.
     notes
-        Sentences on what is shown otherwise than the scene says.
+        Sentences on what is shown otherwise than the scene says, or left out.
     """
 
     method: str = ""

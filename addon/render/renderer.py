@@ -240,6 +240,8 @@ class _Shot:
         report = RenderInfo(info.name, info.backend, self.choice.runner.device, self.choice.reason, dropped=dict(balls.dropped))
         report.milliseconds = dict(surface.milliseconds)
         report.counts = {"balls": len(balls), **surface.counts}
+        if unfinished := surface.counts.get("unfinished"):
+            report.notes = (f"{unfinished} pixels were left out because the method reached its limits there; raise these",)
         return report
 
     def image(self, surface: Surface) -> ImageBuffers:

@@ -148,6 +148,25 @@ def test_wrong_settings_give_one_sentence(asked, command, arguments, status, sen
     assert not asked
 
 
+def test_pixels_that_a_method_leaves_out_are_told(meniscus, scene, command, monkeypatch):
+    renderer = module(meniscus, "render.renderer")
+    create = renderer.create_method
+
+    class Unfinished:
+        def __init__(self, runner):
+            self.runner, self.device = runner, runner.device
+
+        def find_surface(self, request):
+            surface = self.runner.find_surface(request)
+            surface.counts["unfinished"] = 12
+            return surface
+
+    monkeypatch.setattr(renderer, "create_method", lambda name: (create(name)[0], Unfinished(create(name)[1])))
+    status, said = command()
+    assert status == 0
+    assert "12 pixels were left out because the method reached its limits there" in said
+
+
 def test_settings_survive_saving_and_loading(scene, tmp_path):
     own(scene).count = 7
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "fluid.blend"), check_existing=False)
