@@ -37,7 +37,10 @@ class Bounds:
 
 EXACT = Bounds(wrong=0.0, distance=1e-3, rms=1e-4, angle=0.5, tilted=0.0)
 # Methods that sample state what they may miss. A normal jumps at creases, which power_1 has, so a small error makes it another.
-BOUNDS = {"equal_interval": Bounds(wrong=1e-3, distance=0.02, rms=1e-3, angle=0.5, tilted=2e-3)}
+BOUNDS = {
+    "equal_interval": Bounds(wrong=1e-3, distance=0.02, rms=1e-3, angle=0.5, tilted=2e-3),
+    "walking_depth_plane": Bounds(wrong=1e-3, distance=5e-3, rms=1e-4, angle=0.5, tilted=2e-3),
+}
 
 
 def bounds_of(method: str) -> Bounds:
