@@ -38,13 +38,13 @@ void advance(inout Walk walk, inout Bracket bracket, vec4 samples, vec4 values, 
         walk.t = samples[i];
         walk.value = values[i];
     }
-    if (!is_empty || !walk.looks_far) {
+    if (is_empty && limit <= walk_horizon(walk, samples.w) && limit < NOTHING) {
+        walk = walk_leap(walk, limit);
+    } else if (is_empty && walk.looks_far) {
+        walk.first = HAS_STOPPED;
+    } else {
         walk.looks_far = is_empty;
         walk = walk_on(walk);
-    } else if (limit < NOTHING) {
-        walk = walk_leap(walk, limit);
-    } else {
-        walk.first = HAS_STOPPED;
     }
 }
 

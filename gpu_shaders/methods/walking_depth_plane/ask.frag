@@ -27,5 +27,7 @@ void main() {
     } else if (walk_goes_on(walk)) {
         out_samples = walk.first + walk.spacing * vec4(0.0, 1.0, 2.0, 3.0);
     }
-    gl_FragDepth = walk_goes_on(walk) && walk.looks_far ? ANY_DISTANCE : samples_depth(out_samples);
+    gl_FragDepth = samples_depth(out_samples);
+    if (walk_goes_on(walk))
+        gl_FragDepth = min(walk_horizon(walk, out_samples.w) * depth_scale, ANY_DISTANCE);
 }

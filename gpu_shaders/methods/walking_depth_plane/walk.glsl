@@ -19,6 +19,13 @@ struct Walk {
     bool looks_far; // no ball reaches t: how far is the next one?
 };
 
+// So many steps beyond the last sample all balls are known that begin there, without looking far.
+const float VIEW = 8.0;
+
+float walk_horizon(Walk walk, float last) {
+    return walk.looks_far ? NOTHING : last + VIEW * walk.spacing;
+}
+
 const float HAS_STOPPED = -1.0;
 
 Walk walk_unpack(vec4 place, vec2 pace) {
