@@ -92,6 +92,22 @@ impl<'a> Balls<'a> {
     pub fn weights(&self) -> &'a [f32] {
         self.weights
     }
+
+    /// An origin from which every centre is a float exactly: on an axis where all lie within a factor of two of each other,
+    /// differences are exact; elsewhere the world's own.
+    pub fn exact_origin(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let along = self.positions.iter().map(|position| position[axis]);
+            let (low, high) = along.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
+            if low > 0.0 && high <= 2.0 * low {
+                f64::from(low)
+            } else if high < 0.0 && low >= 2.0 * high {
+                f64::from(high)
+            } else {
+                0.0
+            }
+        })
+    }
 }
 
 /// Whether all numbers pass a test; they are looked at in stretches, for which compilers use vectors.

@@ -4,6 +4,7 @@
 //! with an error instead of an abort. Everything else is a way to find the surface.
 
 pub mod balls;
+mod cells;
 pub mod clusters;
 pub mod error;
 pub mod field;
@@ -11,6 +12,7 @@ pub mod fitted_bvh;
 pub mod job;
 pub mod kernel;
 pub mod memory;
+pub mod neighbours;
 pub mod oracle;
 pub mod placing;
 pub mod rasterizer;

@@ -4,6 +4,7 @@
 mod arrays;
 mod clusters;
 mod fitted_bvh;
+mod neighbours;
 mod oracle;
 mod rasterizer;
 mod run;
@@ -21,6 +22,8 @@ mod meniscus_native {
     use super::clusters::find_clusters;
     #[pymodule_export]
     use super::fitted_bvh::FittedBvh;
+    #[pymodule_export]
+    use super::neighbours::find_neighbours;
     #[pymodule_export]
     use super::oracle::{oracle_cast, oracle_crossings};
     #[pymodule_export]

@@ -3,7 +3,6 @@
 //! Two balls are joined where the straight way between their centres lies within the fluid. Where their kernel spheres meet it
 //! does, whatever else is there; only the ways between parts that are not joined yet are followed.
 
-mod cells;
 mod sets;
 #[cfg(test)]
 mod tests;
@@ -12,12 +11,12 @@ mod ways;
 use rayon::prelude::*;
 
 use crate::balls::Balls;
+use crate::cells::Cells;
 use crate::error::Result;
 use crate::field::Field;
 use crate::job::Job;
 use crate::memory;
 
-use self::cells::Cells;
 use self::sets::Sets;
 use self::ways::Ways;
 

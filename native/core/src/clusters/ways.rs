@@ -1,10 +1,9 @@
 //! Whether points, and straight ways, lie within the fluid.
 
 use crate::balls::Balls;
+use crate::cells::Cells;
 use crate::field::Field;
 use crate::kernel::{Kernel, MAX_POWER};
-
-use super::cells::Cells;
 
 /// As a share of the isovalue: the field is on the surface where it is as close to it.
 const CLOSE: f64 = 1e-9;

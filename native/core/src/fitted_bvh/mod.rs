@@ -52,7 +52,7 @@ impl FittedBvh {
     pub fn build(balls: &Balls, field: &Field, options: &Options, job: &Job) -> Result<Self> {
         let path = Path::chosen()?;
         let density = Density::new(field);
-        let origin = exact_origin(balls.positions());
+        let origin = balls.exact_origin();
         let (members, span) = Members::new((0..balls.len()).map(|index| member(balls, index, &origin)))?;
         let plan = Plan { density: &density, options, path, job };
         let bounds = bounds_of(&members, span);
@@ -99,22 +99,6 @@ fn bounds_of(members: &Members, span: members::Span) -> Bounds {
     (0..span.count).fold(Bounds::EMPTY, |bounds, index| {
         let Member { center, radius, .. } = members.get(span, index);
         bounds.union(&Bounds { low: center.map(|c| c - radius), high: center.map(|c| c + radius) }.widened())
-    })
-}
-
-/// An origin from which every centre is a float exactly: on an axis where all lie within a factor of two of each other,
-/// differences are exact; elsewhere the world's own.
-fn exact_origin(positions: &[[f32; 3]]) -> [f64; 3] {
-    std::array::from_fn(|axis| {
-        let along = positions.iter().map(|position| position[axis]);
-        let (low, high) = along.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
-        if low > 0.0 && high <= 2.0 * low {
-            f64::from(low)
-        } else if high < 0.0 && low >= 2.0 * high {
-            f64::from(high)
-        } else {
-            0.0
-        }
     })
 }
 

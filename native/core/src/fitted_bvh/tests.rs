@@ -338,7 +338,8 @@ fn centres_lose_no_digit_to_the_origin() {
     for shift in [[0.0, 0.0, 0.0], [1e5, -1e5, 3e4], [7.0, 1e6, -0.25], [-1e3, 0.5, 1e-3]] {
         let positions: Vec<[f32; 3]> =
             (0..50).map(|index| std::array::from_fn(|axis| shift[axis] + ((index * (axis + 3)) % 17) as f32 * 0.37)).collect();
-        let origin = exact_origin(&positions);
+        let ones = [1.0; 50];
+        let origin = Balls::new(&positions, &ones, &ones).expect("usable balls").exact_origin();
         for position in positions {
             for axis in 0..3 {
                 let exact = f64::from(position[axis]) - origin[axis];
