@@ -47,8 +47,11 @@ type Rod = [i64; 4];
 /// Where the neighbours of a cell lie that come after it, so that every two neighbours meet once.
 const RODS_AFTER: [Rod; 5] = [[0, 0, 1, 1], [0, 1, -1, 1], [1, -1, -1, 1], [1, 0, -1, 1], [1, 1, -1, 1]];
 
+/// How many rods are around a cell.
+pub(crate) const AROUND: usize = 9;
+
 /// Where the cell and its neighbours lie.
-const RODS: [Rod; 9] = [
+const RODS: [Rod; AROUND] = [
     [-1, -1, -1, 1],
     [-1, 0, -1, 1],
     [-1, 1, -1, 1],
@@ -221,50 +224,54 @@ impl Cells {
         })
     }
 
-    /// Visits the entries of a part: each with those of its own grid that may touch it, itself among them, and those of coarser
-    /// grids. Ends early where `visit` says so.
-    #[inline(always)]
-    pub(crate) fn for_entries(&self, part: &Part, mut visit: impl FnMut(usize, &[Entries; 9]) -> bool) {
-        let mut begins = [0; RODS.len()];
-        for cell in part.cells.clone() {
-            let around = self.rods(part.level, cell, &RODS, &mut begins).map(|cells| self.entries(cells));
-            for entry in self.entries(cell..cell + 1) {
-                if !visit(entry, &around) {
-                    return;
-                }
-            }
-        }
+    /// Those of a part.
+    pub(crate) fn cells_of(part: &Part) -> Range<usize> {
+        part.cells.clone()
     }
 
-    /// Visits the entries of coarser grids that may touch an entry of a part.
+    /// The entries of a cell.
     #[inline(always)]
-    pub(crate) fn for_larger(&self, part: &Part, entry: usize, mut visit: impl FnMut(Entries)) {
-        for level in &self.levels[part.level + 1..] {
-            let center = [0, 1, 2].map(|axis| f64::from(self.columns[axis][entry]));
-            let key = level.key(level.place(center));
-            for rod in RODS {
-                visit(self.entries(self.cells_between(level, level.rod(key, rod))));
-            }
-        }
+    pub(crate) fn entries_of(&self, cell: usize) -> Entries {
+        self.entries(cell..cell + 1)
     }
 
-    /// Visits sixteen entries at a time: the first, the square of the distance from `entry`, the square of both reaches, and how
-    /// many there are.
+    /// The entries of the same grid that may touch those of a part's cell, themselves among them. `begins`: zeros at first, for all
+    /// cells of a part in their order.
     #[inline(always)]
-    pub(crate) fn for_distances<S: Simd>(
-        &self,
-        simd: S,
-        entry: usize,
-        others: Entries,
-        mut visit: impl FnMut(usize, S::Vector, S::Vector, usize),
-    ) {
+    pub(crate) fn around(&self, part: &Part, cell: usize, begins: &mut [usize; AROUND]) -> [Entries; AROUND] {
+        self.rods(part.level, cell, &RODS, begins).map(|cells| self.entries(cells))
+    }
+
+    /// How many coarser grids there are than that of a part.
+    #[inline(always)]
+    pub(crate) fn coarser(&self, part: &Part) -> Range<usize> {
+        part.level + 1..self.levels.len()
+    }
+
+    /// The entries of a coarser grid that may touch an entry.
+    #[inline(always)]
+    pub(crate) fn around_in(&self, level: usize, entry: usize) -> [Entries; AROUND] {
+        let level = &self.levels[level];
+        let center = [0, 1, 2].map(|axis| f64::from(self.columns[axis][entry]));
+        let key = level.key(level.place(center));
+        RODS.map(|rod| self.entries(self.cells_between(level, level.rod(key, rod))))
+    }
+
+    /// The centre of an entry and its reach, in all lanes.
+    #[inline(always)]
+    pub(crate) fn sphere<S: Simd>(&self, simd: S, entry: usize) -> [S::Vector; 4] {
+        let [x, y, z, reach] = &self.columns;
+        [simd.splat(x[entry]), simd.splat(y[entry]), simd.splat(z[entry]), simd.splat(reach[entry])]
+    }
+
+    /// The squares of the distances of sixteen entries from a sphere's centre, and of both reaches; numbers behind the last entry
+    /// say nothing.
+    #[inline(always)]
+    pub(crate) fn distances<S: Simd>(&self, simd: S, [x, y, z, reach]: [S::Vector; 4], begin: usize) -> [S::Vector; 2] {
         let [xs, ys, zs, reaches] = &self.columns;
-        let [x, y, z, reach] = [xs, ys, zs, reaches].map(|column| simd.splat(column[entry]));
-        for begin in others.clone().step_by(LANES) {
-            let (x, y, z) = (x - chunk(simd, xs, begin), y - chunk(simd, ys, begin), z - chunk(simd, zs, begin));
-            let reach = reach + chunk(simd, reaches, begin);
-            visit(begin, x.mul_add(x, y.mul_add(y, z * z)), reach * reach, (others.end - begin).min(LANES));
-        }
+        let (x, y, z) = (x - chunk(simd, xs, begin), y - chunk(simd, ys, begin), z - chunk(simd, zs, begin));
+        let reach = reach + chunk(simd, reaches, begin);
+        [x.mul_add(x, y.mul_add(y, z * z)), reach * reach]
     }
 
     /// The number that all balls of a cell have, none where they have several; for all cells.
@@ -274,7 +281,7 @@ impl Cells {
     pub(crate) fn common(&self, number: impl Fn(usize) -> u32 + Sync) -> Result<Vec<Option<u32>>> {
         let mut common = memory::filled(None, self.keys.len())?;
         common.par_iter_mut().enumerate().with_min_len(PART).for_each(|(cell, common)| {
-            let balls = &self.balls[self.entries(cell..cell + 1)];
+            let balls = &self.balls[self.entries_of(cell)];
             let first = number(balls[0] as usize);
             *common = balls.iter().all(|ball| number(*ball as usize) == first).then_some(first);
         });
@@ -290,7 +297,7 @@ impl Cells {
             if columns * rows > level.cells.len() as u64 {
                 let is_within = |place: [u64; 3]| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&place[axis]));
                 for cell in level.cells.clone().filter(|cell| is_within(level.place_of_key(self.keys[*cell]))) {
-                    self.balls[self.entries(cell..cell + 1)].iter().for_each(|ball| visit(*ball as usize));
+                    self.balls[self.entries_of(cell)].iter().for_each(|ball| visit(*ball as usize));
                 }
                 continue;
             }
@@ -373,7 +380,7 @@ impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> PairsTask<'_, K, V> {
         if (self.skips)(cell, cell) {
             return;
         }
-        let entries = self.all.entries(cell..cell + 1);
+        let entries = self.all.entries_of(cell);
         for entry in entries.clone() {
             self.touching(simd, entry, entry + 1..entries.end);
         }
@@ -383,13 +390,14 @@ impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> PairsTask<'_, K, V> {
     #[inline(always)]
     fn pairs_with_larger<S: Simd>(&self, simd: S, cell: usize) {
         for level in &self.all.levels[self.part.level + 1..] {
-            for entry in self.all.entries(cell..cell + 1) {
+            for entry in self.all.entries_of(cell) {
                 let center = [0, 1, 2].map(|axis| f64::from(self.all.columns[axis][entry]));
                 let key = level.key(level.place(center));
                 for rod in RODS {
-                    let others = self.all.cells_between(level, level.rod(key, rod));
-                    for other in others.filter(|other| !(self.skips)(cell, *other)) {
-                        self.touching(simd, entry, self.all.entries(other..other + 1));
+                    for other in self.all.cells_between(level, level.rod(key, rod)) {
+                        if !(self.skips)(cell, other) {
+                            self.touching(simd, entry, self.all.entries_of(other));
+                        }
                     }
                 }
             }
@@ -406,7 +414,7 @@ impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> PairsTask<'_, K, V> {
                 end += 1;
             }
             if begin < end {
-                for entry in self.all.entries(cell..cell + 1) {
+                for entry in self.all.entries_of(cell) {
                     self.touching(simd, entry, self.all.entries(begin..end));
                 }
             }
@@ -416,14 +424,18 @@ impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> PairsTask<'_, K, V> {
 
     #[inline(always)]
     fn touching<S: Simd>(&self, simd: S, entry: usize, others: Entries) {
-        self.all.for_distances(simd, entry, others, |begin, distance_2, reach_2, count| {
-            let mut bits = first_bits(distance_2.lt(reach_2).bits(), count);
+        let sphere = self.all.sphere(simd, entry);
+        let mut begin = others.start;
+        while begin < others.end {
+            let [distance_2, reach_2] = self.all.distances(simd, sphere, begin);
+            let mut bits = first_bits(distance_2.lt(reach_2).bits(), others.end - begin);
             while bits != 0 {
                 let other = begin + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 (self.visit)(self.all.balls[entry] as usize, self.all.balls[other] as usize);
             }
-        });
+            begin += LANES;
+        }
     }
 }
 

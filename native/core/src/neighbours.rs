@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use crate::balls::Balls;
-use crate::cells::{Cells, Entries, Part, first_bits};
+use crate::cells::{AROUND, Cells, Part, first_bits};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::memory;
-use crate::simd::{Mask, Simd, Task, Vector};
+use crate::simd::{LANES, Mask, Simd, Task, Vector};
 
 /// Influence spheres are so much larger, as a share: rounding may put balls into a list that only touch, but leaves none out.
 const MARGIN: f32 = 1e-6;
@@ -97,31 +97,47 @@ impl<F: Fn() -> bool> Task for CountTask<'_, F> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u64 {
-        let (cells, mut untold) = (self.cells, 0);
-        cells.for_entries(self.part, |entry, around| {
-            let mut count = 0;
-            for others in around {
-                cells.for_distances(simd, entry, others.clone(), |_, distance_2, reach_2, lanes| {
-                    count += first_bits(distance_2.le(reach_2).bits(), lanes).count_ones();
-                });
+        let (cells, mut untold, mut begins) = (self.cells, 0, [0; AROUND]);
+        for cell in Cells::cells_of(self.part) {
+            let around = cells.around(self.part, cell, &mut begins);
+            for entry in cells.entries_of(cell) {
+                let sphere = cells.sphere(simd, entry);
+                let mut count = 0;
+                for others in &around {
+                    let mut begin = others.start;
+                    while begin < others.end {
+                        let [distance_2, reach_2] = cells.distances(simd, sphere, begin);
+                        count += first_bits(distance_2.le(reach_2).bits(), others.end - begin).count_ones();
+                        begin += LANES;
+                    }
+                }
+                count -= 1; // itself
+                let mut larger = 0;
+                for level in cells.coarser(self.part) {
+                    for others in cells.around_in(level, entry) {
+                        let mut begin = others.start;
+                        while begin < others.end {
+                            let [distance_2, reach_2] = cells.distances(simd, sphere, begin);
+                            let mut bits = first_bits(distance_2.le(reach_2).bits(), others.end - begin);
+                            larger += bits.count_ones();
+                            while bits != 0 {
+                                self.counts[begin + next_bit(&mut bits)].fetch_add(1, Ordering::Relaxed);
+                            }
+                            begin += LANES;
+                        }
+                    }
+                }
+                self.counts[entry].fetch_add(count + larger, Ordering::Relaxed);
+                untold += u64::from(count) + 2 * u64::from(larger);
+                if untold >= MANY {
+                    self.total.fetch_add(untold, Ordering::Relaxed);
+                    untold = 0;
+                    if !(self.is_few)() {
+                        return 0;
+                    }
+                }
             }
-            count -= 1; // itself
-            let mut larger = 0;
-            cells.for_larger(self.part, entry, |others| {
-                for_touching(simd, cells, entry, others, |other| {
-                    larger += 1;
-                    self.counts[other].fetch_add(1, Ordering::Relaxed);
-                });
-            });
-            self.counts[entry].fetch_add(count + larger, Ordering::Relaxed);
-            untold += u64::from(count) + 2 * u64::from(larger);
-            if untold < MANY {
-                return true;
-            }
-            self.total.fetch_add(untold, Ordering::Relaxed);
-            untold = 0;
-            (self.is_few)()
-        });
+        }
         untold
     }
 }
@@ -158,46 +174,63 @@ impl Task for FillTask<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Result<()> {
-        let (cells, mut far, mut outcome) = (self.cells, Vec::new(), Ok(()));
-        let near = simd.splat(NEAR * NEAR);
-        cells.for_entries(self.part, |entry, around| {
-            let begin = self.starts[entry] as usize;
-            let room = self.starts[entry + 1] as usize - begin;
-            far.clear();
-            outcome = memory::reserve(&mut far, room);
-            if outcome.is_err() {
-                return false;
-            }
-            let mut next = begin;
-            for others in around {
-                cells.for_distances(simd, entry, others.clone(), |first, distance_2, reach_2, lanes| {
-                    let all = first_bits(distance_2.le(reach_2).bits(), lanes);
-                    let near = all & distance_2.lt(near * reach_2).bits();
-                    for_bits(near, |lane| {
-                        if first + lane != entry {
-                            self.places[next].store((first + lane) as u32, Ordering::Relaxed);
-                            next += 1;
+        let (cells, mut begins) = (self.cells, [0; AROUND]);
+        let (mut near, mut far) = (Vec::new(), Vec::new());
+        let near_2 = simd.splat(NEAR * NEAR);
+        for cell in Cells::cells_of(self.part) {
+            let around = cells.around(self.part, cell, &mut begins);
+            for entry in cells.entries_of(cell) {
+                let sphere = cells.sphere(simd, entry);
+                let (mut next, end) = (self.starts[entry] as usize, self.starts[entry + 1] as usize);
+                make_room(&mut near, end - next + LANES)?;
+                make_room(&mut far, end - next + LANES)?;
+                let (mut near_count, mut far_count) = (0, 0);
+                for others in &around {
+                    let mut begin = others.start;
+                    while begin < others.end {
+                        let [distance_2, reach_2] = cells.distances(simd, sphere, begin);
+                        let mut bits = first_bits(distance_2.le(reach_2).bits(), others.end - begin);
+                        if let Some(own) = entry.checked_sub(begin).filter(|own| *own < LANES) {
+                            bits &= !(1 << own);
                         }
-                    });
-                    for_bits(all & !near, |lane| far.push((first + lane) as u32));
-                });
+                        if bits != 0 {
+                            let near_bits = bits & distance_2.lt(near_2 * reach_2).bits();
+                            near_count = append(&mut near, near_count, begin, near_bits);
+                            far_count = append(&mut far, far_count, begin, bits & !near_bits);
+                        }
+                        begin += LANES;
+                    }
+                }
+                for other in near[..near_count].iter().chain(&far[..far_count]) {
+                    self.put(&mut next, *other as usize);
+                }
+                for level in cells.coarser(self.part) {
+                    for others in cells.around_in(level, entry) {
+                        let mut begin = others.start;
+                        while begin < others.end {
+                            let [distance_2, reach_2] = cells.distances(simd, sphere, begin);
+                            let mut bits = first_bits(distance_2.le(reach_2).bits(), others.end - begin);
+                            while bits != 0 {
+                                let other = begin + next_bit(&mut bits);
+                                self.put(&mut next, other);
+                                let end = self.ends[other].fetch_sub(1, Ordering::Relaxed);
+                                self.places[end as usize - 1].store(entry as u32, Ordering::Relaxed);
+                            }
+                            begin += LANES;
+                        }
+                    }
+                }
             }
-            // A sphere so small that its square is 0 is not near itself.
-            for other in far.iter().filter(|other| **other as usize != entry) {
-                self.places[next].store(*other, Ordering::Relaxed);
-                next += 1;
-            }
-            cells.for_larger(self.part, entry, |others| {
-                for_touching(simd, cells, entry, others, |other| {
-                    self.places[next].store(other as u32, Ordering::Relaxed);
-                    next += 1;
-                    let end = self.ends[other].fetch_sub(1, Ordering::Relaxed);
-                    self.places[end as usize - 1].store(entry as u32, Ordering::Relaxed);
-                });
-            });
-            true
-        });
-        outcome
+        }
+        Ok(())
+    }
+}
+
+impl FillTask<'_> {
+    #[inline(always)]
+    fn put(&self, next: &mut usize, other: usize) {
+        self.places[*next].store(other as u32, Ordering::Relaxed);
+        *next += 1;
     }
 }
 
@@ -217,20 +250,37 @@ fn sort_smaller(places: &mut [u32], starts: &[u32], ends: &[AtomicU32]) -> Resul
     Ok(())
 }
 
-/// Visits those of other entries that touch one.
-#[inline(always)]
-fn for_touching<S: Simd>(simd: S, cells: &Cells, entry: usize, others: Entries, mut visit: impl FnMut(usize)) {
-    cells.for_distances(simd, entry, others, |first, distance_2, reach_2, lanes| {
-        for_bits(first_bits(distance_2.le(reach_2).bits(), lanes), |lane| visit(first + lane));
-    });
+fn make_room(buffer: &mut Vec<u32>, count: usize) -> Result<()> {
+    if buffer.len() < count {
+        memory::reserve(buffer, count - buffer.len())?;
+        buffer.resize(count, 0);
+    }
+    Ok(())
 }
 
+/// Writes the numbers of the bits that are set, plus `first`, to a buffer from `count` on; how many there are then. Four are written
+/// at a time, wanted or not: to look at each bit would be a branch that nobody can foretell.
 #[inline(always)]
-fn for_bits(mut bits: u16, mut visit: impl FnMut(usize)) {
-    while bits != 0 {
-        visit(bits.trailing_zeros() as usize);
-        bits &= bits - 1;
+fn append(buffer: &mut [u32], count: usize, first: usize, mut bits: u16) -> usize {
+    let end = count + bits.count_ones() as usize;
+    for four in buffer[count..].as_chunks_mut::<4>().0 {
+        for number in four {
+            *number = first as u32 + bits.trailing_zeros();
+            bits &= bits.wrapping_sub(1);
+        }
+        if bits == 0 {
+            break;
+        }
     }
+    end
+}
+
+/// Takes the lowest bit that is set; its number.
+#[inline(always)]
+fn next_bit(bits: &mut u16) -> usize {
+    let bit = bits.trailing_zeros() as usize;
+    *bits &= *bits - 1;
+    bit
 }
 
 #[cfg(test)]
