@@ -20,6 +20,7 @@ _FOLDERS = (
     "gpu_shaders.methods.depth_peeling",
     # Those that sample come last: none is taken for what the others can draw.
     "gpu_shaders.methods.equal_interval",
+    "gpu_shaders.methods.vicinity",
     "gpu_shaders.methods.walking_depth_plane",
 )
 

@@ -150,7 +150,7 @@ float trace_rounding(vec3 start, vec3 point) {
 
 // A point of the surface, seen along a ray.
 Vertex trace_vertex(Segment segment, TreeHit hit, int medium) {
-    TreeSurface surface = tree_surface(segment, hit);
+    LeafSurface surface = tree_surface(segment, hit);
     int index = surface.ball < 0 ? 0 : ball_source(surface.ball);
     Material material = light_material(uint(index));
 #if WITH_COLORS

@@ -31,15 +31,6 @@ uniform samplerBuffer velocities_tx;
 #endif
 #endif
 
-struct TreeSurface {
-    vec3 normal;     // unit, out of the fluid
-    float steepness; // of the field
-    float radius;    // of the ball with the greatest share
-    int ball;        // its number
-    vec3 color;
-    vec3 velocity;
-};
-
 uint leaf_id(uint entry) {
 #if !WITH_IDS
     return 0u;
@@ -73,39 +64,10 @@ vec3 ball_velocity(uint id) {
 }
 #endif
 
-TreeSurface tree_surface(Segment segment, TreeHit hit) {
-    TreeSurface surface = TreeSurface(vec3(0.0), 0.0, 1.0, -1, vec3(0.0), vec3(0.0));
-    vec3 point = segment.start + hit.t * segment.direction;
-    float total = 0.0, greatest = 0.0;
-    for (uint i = 0u; i < min(hit.count, MOST_ENTRIES); i++) {
-        uint entry = hit.first + i;
-        vec4 sphere = leaf_sphere(entry);
-        vec3 away = (point - sphere.xyz) / sphere.w;
-        float x = 1.0 - dot(away, away);
-        if (x <= 0.0)
-            continue;
-        float weight = leaf_weight(entry);
-        surface.normal += weight * kernel_derivative(x) / sphere.w * away;
-        float share = max(weight * kernel_value(x), 0.0);
-        uint id = leaf_id(entry);
-#if WITH_COLORS
-        surface.color += share * ball_color(id);
-#endif
-#if WITH_VELOCITIES
-        surface.velocity += share * ball_velocity(id);
-#endif
-        total += share;
-        if (share > greatest) {
-            greatest = share;
-            surface.ball = int(id);
-            surface.radius = sphere.w;
-        }
-    }
-    float pull = length(surface.normal);
-    surface.steepness = 2.0 * pull;
+#include "lib/leaf_surface.glsl"
+
+LeafSurface tree_surface(Segment segment, TreeHit hit) {
     // Where the field is level, which has no normal, the one that faces along the ray.
-    surface.normal = pull > 0.0 ? surface.normal / pull : segment.direction * (hit.is_inside ? 1.0 : -1.0);
-    surface.color /= max(total, 1e-30);
-    surface.velocity /= max(total, 1e-30);
-    return surface;
+    vec3 level = segment.direction * (hit.is_inside ? 1.0 : -1.0);
+    return leaf_surface(hit.first, hit.count, segment.start + hit.t * segment.direction, level);
 }

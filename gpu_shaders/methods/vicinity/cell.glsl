@@ -1,0 +1,44 @@
+// Whose part of space a point is in: that of the ball with the least power |p - c|^2 - R^2. Every point of the fluid lies in the
+// influence sphere of that ball, so it is enough if each ball searches its own part. Parts meet in planes: along a ray each is one
+// interval, and the fragments of all balls share a ray among them instead of each searching all of its sphere.
+#include "lib/leaf_ball.glsl"
+
+// Beyond the planes by so much, in squares of R and as a share of what was added: rounding leaves no gap.
+const float CELL_MARGIN = 4e-6;
+
+// Cuts [begin, end] down to the part of the ball with the entry 0; false where nothing is left. The nearest neighbours cut most and
+// come first in the list.
+bool cell_clip(Leaf leaf, LeafBall own, inout float begin, inout float end) {
+    // In radii of the ball, from its own middle.
+    float scale = own.inverse;
+    float first = (begin - own.middle) * scale, last = (end - own.middle) * scale;
+    float low = first, high = last;
+    for (uint i = 1u; i < min(leaf.count, MOST_ENTRIES); i++) {
+        vec4 sphere = leaf_sphere(i);
+        vec3 to_center = (sphere.xyz - leaf.point) * scale;
+        float along = dot(to_center, leaf.direction);
+        vec3 apart = to_center - along * leaf.direction;
+        float radius = sphere.w * scale, delta = along - own.middle * scale;
+        // 2 delta u <= square, where u is the distance from the own middle.
+        float away_2 = dot(apart, apart), radius_2 = radius * radius;
+        float square = delta * delta + own.peak + away_2 - radius_2;
+        square += CELL_MARGIN * (1.0 + delta * delta + away_2 + radius_2);
+        if (abs(delta) > 1e-6) {
+            float plane = 0.5 * square / delta;
+            if (delta > 0.0)
+                high = min(high, plane);
+            else
+                low = max(low, plane);
+        } else if (square < -1e-5) {
+            return false;
+        }
+        if (low >= high)
+            return false;
+    }
+    // What is not cut stays what it is, to the last digit.
+    if (low > first)
+        begin = own.middle + low / scale;
+    if (high < last)
+        end = own.middle + high / scale;
+    return begin < end;
+}

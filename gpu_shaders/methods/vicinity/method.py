@@ -1,0 +1,248 @@
+"""Runs the shaders of Vicinity; see the package for what it does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ....addon.fluid.balls import Balls
+from ....addon.fluid.camera import Camera, Region
+from ....addon.fluid.errors import MeniscusError
+from ....addon.fluid.kernels import KERNELS
+from ....addon.render.method import Request, Surface, timed
+from ....addon.render.neighbours import MOST_NEIGHBOURS, Neighbours, find_neighbours
+from ...camera_parts import image_parts
+from ...context import GpuContext, shared_context
+from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
+from ...stage_times import StageTimes
+from ...step import Step, Texture
+from ...surface_textures import SurfaceTextures
+from .balls import BallTextures
+from .params import BISECTIONS, EXACT, METHOD, SAMPLES
+from .programs import Variant
+
+Result = TypeVar("Result")
+
+_PIXELS_A_PART = 1 << 22
+_CORNERS = 6
+"""Vertices of a ball's rectangle."""
+
+
+class Vicinity:
+    """The method on one OpenGL context."""
+
+    def __init__(self, context: GpuContext) -> None:
+        # Depth, normal, three attributes and the barrier.
+        context.require(METHOD.gl_version, draw_buffers=6)
+        self._context = context
+        self._steps: dict[Variant, dict[str, Step]] = {}
+        self._lists: tuple[Balls, Neighbours] | None = None
+        self._balls: BallTextures | None = None
+        self._targets: _Targets | None = None
+        # A driver that rejects the shaders is to be known before the method is chosen.
+        context.run(lambda: self._steps_of(Variant(KERNELS["wyvill"])))
+
+    @property
+    def device(self) -> str:
+        """What the driver calls the graphics processor."""
+        return str(self._context.renderer)
+
+    @property
+    def shares_textures(self) -> bool:
+        """See :meth:`method.DeviceMethod.shares_textures`."""
+        return self._context.shares
+
+    def find_surface(self, request: Request) -> Surface:
+        """See :meth:`method.Method.find_surface`."""
+        surface = Surface.background(request.camera, request.known_attributes)
+        if len(request.balls):
+            lists = self._lists_of(request, surface.milliseconds)
+            with timed(surface.milliseconds, "surface"):
+                limits = self._context.limits
+                longest = min(limits.texture_size, limits.viewport_size)
+                for region in image_parts(request.camera, _PIXELS_A_PART, longest):
+                    request.watch(region.y_min / request.camera.height)
+                    self._run(partial(self._find_part, request, lists, region, surface))
+            surface.counts |= self._counts(lists)
+        return surface
+
+    def find_surface_on_device(self, request: Request) -> SurfaceTextures:
+        """See :meth:`method.DeviceMethod.find_surface_on_device`."""
+        camera = request.camera
+        milliseconds: dict[str, float] = {}
+        self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
+        lists = self._lists_of(request, milliseconds) if len(request.balls) else None
+        with timed(milliseconds, "surface"):
+            textures = self._run(lambda: self._find_on_device(request, lists))
+        textures.milliseconds |= milliseconds
+        if lists is not None:
+            textures.counts |= self._counts(lists)
+        return textures
+
+    def _run(self, work: Callable[[], Result]) -> Result:
+        """Do `work` on the context's thread; after an error nothing is kept, as the driver may have refused the memory."""
+        try:
+            return self._context.run(work)
+        except MeniscusError:
+            self._balls, self._targets = None, None
+            raise
+
+    def _lists_of(self, request: Request, milliseconds: dict[str, float]) -> Neighbours:
+        """The neighbours of the balls, which stay while the same balls are asked for; the time that they took where they are new."""
+        if self._lists is None or self._lists[0] is not request.balls:
+            self._lists, self._balls = None, None  # their memory may be needed
+            most = min(self._context.limits.texture_buffer_size, MOST_NEIGHBOURS)
+            with timed(milliseconds, "neighbours"):
+                found = find_neighbours(request.balls, most=most, threads=request.threads, watch=request.watch)
+            self._lists = request.balls, found
+        return self._lists[1]
+
+    def _counts(self, lists: Neighbours) -> dict[str, int]:
+        return {"neighbours": len(lists.places), "lone_balls": int(np.count_nonzero(lists.counts == 0))}
+
+    def _find_part(self, request: Request, lists: Neighbours, region: Region, surface: Surface) -> None:
+        """Fill a part of `surface`; on the context's thread."""
+        camera = replace(request.camera, region=region).cropped()
+        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
+        self._find(request, lists, camera, textures)
+        textures.read_into(surface, region)
+
+    def _find_on_device(self, request: Request, lists: Neighbours | None) -> SurfaceTextures:
+        """On the context's thread."""
+        camera = request.camera
+        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
+        if lists is None:
+            textures.clear()
+        else:
+            self._find(request, lists, camera, textures)
+        # Another context sees what is finished; it could not wait for what is not.
+        self._context.gl.finish()
+        return textures
+
+    def _find(self, request: Request, lists: Neighbours, camera: Camera, textures: SurfaceTextures) -> None:
+        """Fill the textures."""
+        times = StageTimes(self._context)
+        with times.of("upload"):
+            balls = self._uploaded(request, lists)
+        with times.of("cast"):
+            self._draw(request, balls, lists, camera, textures)
+        textures.add_report(times.milliseconds, {})
+
+    def _uploaded(self, request: Request, lists: Neighbours) -> BallTextures:
+        attributes = frozenset(request.known_attributes)
+        if self._balls is None:
+            self._balls = BallTextures(self._context, request.balls, lists, request.field, attributes)
+        if self._balls.field != request.field:
+            self._balls.set_field(request.field)
+        self._balls.add(attributes)
+        return self._balls
+
+    def _draw(
+        self, request: Request, balls: BallTextures, lists: Neighbours, camera: Camera, textures: SurfaceTextures
+    ) -> None:
+        """Draw kernel spheres, find where rays start inside, and cast."""
+        gl, field = self._context.gl, request.field
+        box = request.balls.bounds
+        uniforms = {
+            **scene_camera_uniforms(box - lists.origin, lists.origin, camera),
+            **balls.uniforms,
+            **_setting_uniforms(request.settings),
+            "isovalue": field.isovalue,
+            "depth_scale": _depth_scale(camera, box),
+        }
+        # Where all influence spheres begin behind the near clip plane no ray can start in one.
+        may_start_inside = float(np.min(box_depths(box, camera))) <= camera.clip_start * (1 + 1e-6)
+        with_starts = may_start_inside or bool(np.any(request.balls.weights < 0))
+        variant = Variant(
+            field.density_kernel,
+            request.balls.weight is None,
+            with_starts,
+            bool(request.settings.get(EXACT.name, EXACT.default)),
+            request.known_attributes,
+        )
+        steps = self._steps_of(variant)
+        for step in steps.values():
+            step.set_uniforms(uniforms)
+        targets = self._targets_of(textures.size)
+        gl.disable(moderngl.BLEND | moderngl.CULL_FACE)
+        vertices = _CORNERS * len(request.balls)
+        targets.kernel.clear(depth=1.0)
+        _draw(gl, steps["kernel"], targets.kernel, vertices, balls.textures, moderngl.DEPTH_TEST, "<")
+        read: dict[str, Texture] = {**balls.textures, "kernel_depth_tx": targets.kernel_depth}
+        if with_starts:
+            targets.start.clear()
+            gl.blend_func, gl.blend_equation = (moderngl.ONE, moderngl.ONE), moderngl.FUNC_ADD
+            _draw(gl, steps["start"], targets.start, vertices, read, moderngl.BLEND)
+            read["start_tx"] = targets.start_density
+        found = list(textures.textures.values())
+        begin = gl.framebuffer([*found, targets.barrier], targets.depth)
+        _draw(gl, steps["begin"], begin, 3, read, moderngl.DEPTH_TEST, "1")
+        cast = gl.framebuffer(found, targets.depth)
+        _draw(gl, steps["cast"], cast, vertices, {**read, "barrier_tx": targets.barrier}, moderngl.DEPTH_TEST, "<=")
+
+    def _targets_of(self, size: tuple[int, int]) -> _Targets:
+        if self._targets is None or self._targets.size != size:
+            self._targets = None  # its memory may be needed
+            self._targets = _Targets(self._context, size)
+        return self._targets
+
+    def _steps_of(self, variant: Variant) -> dict[str, Step]:
+        if variant not in self._steps:
+            self._steps[variant] = {name: Step(self._context, program) for name, program in variant.programs().items()}
+        return self._steps[variant]
+
+
+def create() -> Vicinity:
+    """The method on the process's context; raises DeviceError where there is none that can run it."""
+    return shared_context().kept(Vicinity)
+
+
+class _Targets:
+    """What is drawn into beside the surface, for one size of image."""
+
+    def __init__(self, context: GpuContext, size: tuple[int, int]) -> None:
+        gl = context.gl
+        self.size = size
+        self.kernel_depth = context.depth_texture(size)
+        self.depth = context.depth_texture(size)
+        self.start_density = gl.texture(size, 2, dtype="f4")
+        self.barrier = gl.texture(size, 1, dtype="f4")
+        for texture in (self.start_density, self.barrier):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.kernel = gl.framebuffer([], self.kernel_depth)
+        self.start = gl.framebuffer([self.start_density])
+
+
+def _setting_uniforms(settings: Mapping[str, bool | int | float]) -> dict[str, object]:
+    return {setting.name: int(settings.get(setting.name, setting.default)) for setting in (SAMPLES, BISECTIONS)}
+
+
+def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
+    """A power of two, so that scaling loses nothing, which brings distances from the anchor's plane below 1/2."""
+    window = camera.window
+    slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
+    stretch = math.hypot(1.0, *slopes) if camera.is_perspective else 1.0
+    farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
+    return float(2.0 ** -(math.ceil(math.log2(max(farthest, 1e-30))) + 1))
+
+
+def _draw(
+    gl: moderngl.Context,
+    step: Step,
+    framebuffer: moderngl.Framebuffer,
+    vertices: int,
+    textures: Mapping[str, Texture],
+    flags: int,
+    depth_func: str = "<",
+) -> None:
+    gl.enable_only(flags)
+    gl.depth_func = depth_func
+    framebuffer.viewport = (0, 0, *framebuffer.size)
+    step.draw(framebuffer, moderngl.TRIANGLES, vertices, textures)
