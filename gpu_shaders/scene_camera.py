@@ -11,9 +11,7 @@ from ..addon.fluid.camera import Camera
 from .camera_parts import camera_uniforms
 
 
-def scene_camera_uniforms(
-    box: npt.NDArray[np.floating], origin: npt.NDArray[np.float64], camera: Camera
-) -> dict[str, object]:
+def scene_camera_uniforms(box: npt.NDArray[np.floating], origin: npt.NDArray[np.float64], camera: Camera) -> dict[str, object]:
     """A camera that begins at a plane near what is seen: what is large is subtracted here, in double precision.
 
     Parameters

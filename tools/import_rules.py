@@ -41,7 +41,7 @@ AREAS = (
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
     Area(
         "gpu_shaders",
-        ("addon/fluid", *TREES, "addon/render/method", "addon/render/settings", "gpu_shaders"),
+        ("addon/fluid", *TREES, "addon/render/method", "addon/render/neighbours", "addon/render/settings", "gpu_shaders"),
         OPENGL | {"numpy"},
     ),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),

@@ -40,6 +40,8 @@ EXACT = Bounds(wrong=0.0, distance=1e-3, rms=1e-4, angle=0.5, tilted=0.0)
 BOUNDS = {
     "equal_interval": Bounds(wrong=1e-3, distance=0.02, rms=1e-3, angle=0.5, tilted=2e-3),
     "walking_depth_plane": Bounds(wrong=1e-3, distance=5e-3, rms=1e-4, angle=0.5, tilted=2e-3),
+    # Its last step is 2 R / 10 samples / 2^4 bisections.
+    "vicinity": Bounds(wrong=1e-3, distance=0.0125, rms=5e-4, angle=1.0, tilted=2e-3),
 }
 
 

@@ -4,6 +4,7 @@
 #include "lib/conservative_depth.glsl"
 #include "lib/scene_camera.glsl"
 #include "methods/vicinity/depth.glsl"
+#include "methods/vicinity/kernel_sphere.glsl"
 #include "methods/vicinity/lists.glsl"
 #include "methods/vicinity/outputs.glsl"
 #include "methods/vicinity/cell.glsl"
@@ -18,16 +19,6 @@ uniform sampler2D barrier_tx;
 
 flat in vec4 v_sphere;
 flat in float v_kernel_radius;
-
-// Where a ball without neighbours has its surface.
-bool cross_kernel_sphere(LeafBall own, float begin, float end, out float at, out bool is_inside) {
-    float share = v_kernel_radius * own.inverse;
-    // x is own.peak - 1 + share^2 on the sphere of that radius.
-    float half_length = sqrt(max(own.peak - (1.0 - share) * (1.0 + share), 0.0)) / own.inverse;
-    is_inside = own.middle - half_length < begin;
-    at = is_inside ? own.middle + half_length : own.middle - half_length;
-    return half_length > 0.0 && at >= begin && at <= end;
-}
 
 void main() {
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
@@ -44,10 +35,12 @@ void main() {
     float at = end;
     bool is_inside = false, is_found = false;
     if (v_count == 0u) {
+        vec2 chord = kernel_sphere_chord(start, direction, v_sphere.xyz, v_kernel_radius);
+        is_inside = chord.x - chord.y < clip_depths.x * ray.stretch;
+        at = (is_inside ? chord.x + chord.y : chord.x - chord.y) - middle;
         // The barrier may be this very sphere, rounded another way.
-        float slack = 1e-5 / own.inverse;
-        is_found = own.peak > 0.0 && cross_kernel_sphere(own, begin, end + slack, at, is_inside);
-        at = min(at, end);
+        is_found = chord.y > 0.0 && at + middle >= clip_depths.x * ray.stretch && at <= last + 1e-6 * abs(chord.x);
+        at = min(at, last);
     } else if (begin < end && cell_clip(leaf, own, begin, end)) {
         bool ends_inside = barrier < NOWHERE && end >= barrier - middle;
 #if EXACT

@@ -70,7 +70,9 @@ bool march(Leaf leaf, float begin, float end, float radius, bool ends_inside, ou
         slope *= side;
         bool has_crossed = false, climbs = false;
         // The last of five is the end of the bracket.
-        for (int k = 0; k < (mode == MARCHES ? 4 : 5); k++) {
+        for (int k = 0; k < 5; k++) {
+            if (k == 4 && mode == MARCHES)
+                break;
             Sample here = k < 4 ? Sample(at[min(k, 3)], gap[min(k, 3)], slope[min(k, 3)]) : high;
             if (is_first && k == 0) {
                 low = here;

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera, Region
-from ....addon.fluid.errors import MeniscusError
-from ....addon.fluid.kernels import KERNELS
+from ....addon.fluid.errors import InputError, MeniscusError
+from ....addon.fluid.kernels import KERNELS, PolynomialKernel
 from ....addon.render.method import Request, Surface, timed
 from ....addon.render.neighbours import MOST_NEIGHBOURS, Neighbours, find_neighbours
 from ...camera_parts import image_parts
@@ -61,6 +61,7 @@ class Vicinity:
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""
+        _check(request)
         surface = Surface.background(request.camera, request.known_attributes)
         if len(request.balls):
             lists = self._lists_of(request, surface.milliseconds)
@@ -75,6 +76,7 @@ class Vicinity:
 
     def find_surface_on_device(self, request: Request) -> SurfaceTextures:
         """See :meth:`method.DeviceMethod.find_surface_on_device`."""
+        _check(request)
         camera = request.camera
         milliseconds: dict[str, float] = {}
         self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
@@ -95,7 +97,7 @@ class Vicinity:
             raise
 
     def _lists_of(self, request: Request, milliseconds: dict[str, float]) -> Neighbours:
-        """The neighbours of the balls, which stay while the same balls are asked for; the time that they took where they are new."""
+        """The neighbours of the balls, which stay while the same balls are asked for; the time that new ones took."""
         if self._lists is None or self._lists[0] is not request.balls:
             self._lists, self._balls = None, None  # their memory may be needed
             most = min(self._context.limits.texture_buffer_size, MOST_NEIGHBOURS)
@@ -154,7 +156,7 @@ class Vicinity:
             **scene_camera_uniforms(box - lists.origin, lists.origin, camera),
             **balls.uniforms,
             **_setting_uniforms(request.settings),
-            "isovalue": field.isovalue,
+            "isovalue": field.threshold,
             "depth_scale": _depth_scale(camera, box),
         }
         # Where all influence spheres begin behind the near clip plane no ray can start in one.
@@ -164,7 +166,7 @@ class Vicinity:
             field.density_kernel,
             request.balls.weight is None,
             with_starts,
-            bool(request.settings.get(EXACT.name, EXACT.default)),
+            bool(request.settings[EXACT.name]),
             request.known_attributes,
         )
         steps = self._steps_of(variant)
@@ -178,7 +180,8 @@ class Vicinity:
         read: dict[str, Texture] = {**balls.textures, "kernel_depth_tx": targets.kernel_depth}
         if with_starts:
             targets.start.clear()
-            gl.blend_func, gl.blend_equation = (moderngl.ONE, moderngl.ONE), moderngl.FUNC_ADD
+            gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+            gl.blend_func = moderngl.ONE, moderngl.ONE
             _draw(gl, steps["start"], targets.start, vertices, read, moderngl.BLEND)
             read["start_tx"] = targets.start_density
         found = list(textures.textures.values())
@@ -221,7 +224,17 @@ class _Targets:
 
 
 def _setting_uniforms(settings: Mapping[str, bool | int | float]) -> dict[str, object]:
-    return {setting.name: int(settings.get(setting.name, setting.default)) for setting in (SAMPLES, BISECTIONS)}
+    return {setting.name: int(settings[setting.name]) for setting in (SAMPLES, BISECTIONS)}
+
+
+def _check(request: Request) -> None:
+    """InputError where what is asked for does not go together."""
+    kernel = request.field.density_kernel
+    if request.settings[EXACT.name] and not isinstance(kernel, PolynomialKernel):
+        raise InputError(
+            f"{METHOD.label} finds the exact surface of polynomial kernels only, and {kernel.label} is none; switch "
+            f"'{EXACT.label}' off, or choose another kernel"
+        )
 
 
 def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:

@@ -33,5 +33,6 @@ METHOD = MethodInfo(
     backend="gpu",
     attributes=frozenset({"color", "velocity", "ball"}),
     gl_version=330,
+    any_kernel=True,
     settings=(SAMPLES, BISECTIONS, EXACT),
 )

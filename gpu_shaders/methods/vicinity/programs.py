@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import KERNELS, Kernel, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
 from ...kernel_constants import kernel_constants
@@ -79,7 +79,8 @@ def all_programs() -> Iterator[ProgramSource]:
     subsets = [chosen for count in range(4) for chosen in combinations(ATTRIBUTES, count)]
     flags = (False, True)
     for kernel, weights, starts, exact, attributes in product(KERNELS.values(), flags, flags, flags, subsets):
-        yield from Variant(kernel, weights, starts, exact, attributes).programs().values()
+        if isinstance(kernel, PolynomialKernel) or not exact:
+            yield from Variant(kernel, weights, starts, exact, attributes).programs().values()
 
 
 def _program(name: str, vertex: str, **constants: object) -> ProgramSource:

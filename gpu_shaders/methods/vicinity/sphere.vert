@@ -21,16 +21,16 @@ flat out vec4 v_sphere;
 flat out float v_weight;
 flat out float v_kernel_radius;
 
-// Whether the pass is about a sphere at all, which lies between these planar depths.
-bool is_drawn(float nearest, float farthest) {
+// Whether the pass is about a ball at all whose sphere lies between these planar depths.
+bool is_drawn(float nearest, float farthest, uint count, float weight, float kernel_radius) {
     bool is_seen = farthest >= clip_distances.x && nearest <= clip_distances.y;
 #if KERNEL_SPHERES
-    return is_seen && v_kernel_radius > 0.0;
+    return is_seen && kernel_radius > 0.0;
 #elif STARTS_ONLY
-    return is_seen && (v_weight < 0.0 || nearest <= clip_distances.x);
+    return is_seen && (weight < 0.0 || nearest <= clip_distances.x);
 #else
     // A ball that is alone has no other surface.
-    return is_seen && (v_count > 0u || v_kernel_radius > 0.0);
+    return is_seen && (count > 0u || kernel_radius > 0.0);
 #endif
 }
 
@@ -58,7 +58,7 @@ void main() {
     float nearest = -center.z - radius - slack;
     vec4 rectangle = sphere_rectangle(center, radius + slack);
     // Where nothing is to be drawn all corners fall together.
-    vec2 corner = is_drawn(nearest, radius + slack - center.z) ? square_corner(gl_VertexID % 6) : vec2(0.0);
+    vec2 corner = is_drawn(nearest, radius + slack - center.z, v_count, v_weight, v_kernel_radius) ? square_corner(gl_VertexID % 6) : vec2(0.0);
     vec2 position = mix(rectangle.xy, max(rectangle.zw, rectangle.xy), corner) / image_middle - 1.0;
     // Nearer than anything of the sphere: fragments may be dropped early by this depth.
     float depth = clamp((nearest - anchor_depth) * depth_scale, 0.0, 1.0);
