@@ -205,21 +205,39 @@ impl Cells {
         self.levels.iter().enumerate().flat_map(of_level).collect()
     }
 
-    /// Visits each pair of balls that touch at least once, in any order, on all threads. Whole cells are left out where `skips`
-    /// says so of their numbers.
+    /// Visits each pair of balls of a cell that touch, in any order, on all threads. Whole cells are left out where `skips` says
+    /// so of their numbers.
     ///
     /// # Errors
     /// `Cancelled`.
-    pub(crate) fn for_pairs(
+    pub(crate) fn for_pairs_within(
         &self,
         job: &Job,
         skips: impl Fn(usize, usize) -> bool + Sync,
         visit: impl Fn(usize, usize) + Sync,
     ) -> Result<()> {
+        self.for_parts(job, |part| self.path.dispatch(WithinTask(PairsTask { all: self, part, skips: &skips, visit: &visit })))
+    }
+
+    /// Visits each pair of balls of different cells that touch at least once, in any order, on all threads. Pairs of cells are
+    /// left out where `skips` says so, and left where it says so after pairs of them were visited.
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub(crate) fn for_pairs_between(
+        &self,
+        job: &Job,
+        skips: impl Fn(usize, usize) -> bool + Sync,
+        visit: impl Fn(usize, usize) + Sync,
+    ) -> Result<()> {
+        self.for_parts(job, |part| self.path.dispatch(BetweenTask(PairsTask { all: self, part, skips: &skips, visit: &visit })))
+    }
+
+    fn for_parts(&self, job: &Job, work: impl Fn(Part) + Sync) -> Result<()> {
         let parts = self.parts();
         job.expect(parts.len());
         parts.into_par_iter().try_for_each(|part| {
-            self.path.dispatch(PairsTask { all: self, part, skips: &skips, visit: &visit });
+            work(part);
             job.advance(1)
         })
     }
@@ -358,18 +376,39 @@ struct PairsTask<'a, K, V> {
     visit: &'a V,
 }
 
-impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> Task for PairsTask<'_, K, V> {
+/// Those within cells.
+struct WithinTask<'a, K, V>(PairsTask<'a, K, V>);
+
+impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> Task for WithinTask<'_, K, V> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let mut begins = [0; RODS_AFTER.len()];
-        for cell in self.part.cells.clone() {
-            self.pairs_within(simd, cell);
-            for others in self.all.rods(self.part.level, cell, &RODS_AFTER, &mut begins) {
-                self.pairs_between(simd, cell, others);
+        for cell in self.0.part.cells.clone() {
+            self.0.pairs_within(simd, cell);
+        }
+    }
+}
+
+/// Those between cells.
+struct BetweenTask<'a, K, V>(PairsTask<'a, K, V>);
+
+impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> Task for BetweenTask<'_, K, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let (task, mut begins) = (self.0, [0; RODS_AFTER.len()]);
+        for cell in task.part.cells.clone() {
+            let is_full = task.all.entries_of(cell).len() >= LANES / 2;
+            for others in task.all.rods(task.part.level, cell, &RODS_AFTER, &mut begins) {
+                if is_full {
+                    task.pairs_by_cells(simd, cell, others);
+                } else {
+                    task.pairs_by_rods(simd, cell, others);
+                }
             }
-            self.pairs_with_larger(simd, cell);
+            task.pairs_with_larger(simd, cell);
         }
     }
 }
@@ -404,9 +443,22 @@ impl<K: Fn(usize, usize) -> bool, V: Fn(usize, usize)> PairsTask<'_, K, V> {
         }
     }
 
-    /// Pairs of a cell's balls with those of others that follow one another.
+    /// Pairs of a cell's balls with those of others, cell by cell: no more than are needed until the others are left.
     #[inline(always)]
-    fn pairs_between<S: Simd>(&self, simd: S, cell: usize, others: Range<usize>) {
+    fn pairs_by_cells<S: Simd>(&self, simd: S, cell: usize, others: Range<usize>) {
+        for other in others {
+            for entry in self.all.entries_of(cell) {
+                if (self.skips)(cell, other) {
+                    break;
+                }
+                self.touching(simd, entry, self.all.entries_of(other));
+            }
+        }
+    }
+
+    /// Pairs of a cell's balls with those of others that follow one another, as vectors are fuller then.
+    #[inline(always)]
+    fn pairs_by_rods<S: Simd>(&self, simd: S, cell: usize, others: Range<usize>) {
         let mut begin = others.start;
         while begin < others.end {
             let mut end = begin;
@@ -586,7 +638,8 @@ mod tests {
         let note = |one: usize, other: usize| {
             found.lock().expect("no panic").insert((one.min(other), one.max(other)));
         };
-        cells.for_pairs(&Job::default(), |_, _| false, note).expect("pairs");
+        cells.for_pairs_within(&Job::default(), |_, _| false, note).expect("pairs");
+        cells.for_pairs_between(&Job::default(), |_, _| false, note).expect("pairs");
         let touch = |one: usize, other: usize| {
             let square = |axis: usize| (f64::from(centers[one][axis]) - f64::from(centers[other][axis])).powi(2);
             (square(0) + square(1) + square(2)).sqrt() < f64::from(reaches[one] + reaches[other])

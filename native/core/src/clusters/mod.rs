@@ -45,20 +45,26 @@ pub fn clusters(balls: &Balls, field: &Field, job: &Job) -> Result<Clusters> {
     let kernels = kernel_radii(balls, field, &influence)?;
     let sets = Sets::new(balls.len())?;
     let kernel_cells = Cells::new(balls.positions(), &kernels)?;
-    kernel_cells.for_pairs(job, |_, _| false, |one, other| sets.join(one, other))?;
+    kernel_cells.for_pairs_within(job, |_, _| false, |one, other| sets.join(one, other))?;
+    // Most cells are in one set by now: one pair that touches joins two of them.
+    let roots = kernel_cells.common(|ball| sets.root(ball))?;
+    let are_joined = |one: usize, other: usize| match (roots[one], roots[other]) {
+        (Some(one), Some(other)) => sets.are_joined(one as usize, other as usize),
+        _ => false,
+    };
+    kernel_cells.for_pairs_between(job, are_joined, |one, other| sets.join(one, other))?;
     let ways = Ways::new(balls, field, &influence);
     let mut is_wet = memory::filled(false, balls.len())?;
     is_wet.par_iter_mut().enumerate().for_each(|(ball, is_wet)| *is_wet = kernels[ball] > 0.0 || ways.begins_in_fluid(ball));
     let roots = influence.common(|ball| sets.root(ball))?;
-    influence.for_pairs(
-        job,
-        |one, other| roots[one].is_some() && roots[one] == roots[other],
-        |one, other| {
-            if is_wet[one] && is_wet[other] && !sets.are_joined(one, other) && ways.lies_in_fluid(one, other) {
-                sets.join(one, other);
-            }
-        },
-    )?;
+    let is_one = |one: usize, other: usize| roots[one].is_some() && roots[one] == roots[other];
+    let join = |one: usize, other: usize| {
+        if is_wet[one] && is_wet[other] && !sets.are_joined(one, other) && ways.lies_in_fluid(one, other) {
+            sets.join(one, other);
+        }
+    };
+    influence.for_pairs_within(job, is_one, join)?;
+    influence.for_pairs_between(job, is_one, join)?;
     labelled(&sets, &is_wet)
 }
 
