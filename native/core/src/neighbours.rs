@@ -201,8 +201,10 @@ impl Task for FillTask<'_> {
                         begin += LANES;
                     }
                 }
-                for other in near[..near_count].iter().chain(&far[..far_count]) {
-                    self.put(&mut next, *other as usize);
+                for found in [&near[..near_count], &far[..far_count]] {
+                    let list = &self.places[next..next + found.len()];
+                    list.iter().zip(found).for_each(|(place, other)| place.store(*other, Ordering::Relaxed));
+                    next += found.len();
                 }
                 for level in cells.coarser(self.part) {
                     for others in cells.around_in(level, entry) {
@@ -212,7 +214,8 @@ impl Task for FillTask<'_> {
                             let mut bits = first_bits(distance_2.le(reach_2).bits(), others.end - begin);
                             while bits != 0 {
                                 let other = begin + next_bit(&mut bits);
-                                self.put(&mut next, other);
+                                self.places[next].store(other as u32, Ordering::Relaxed);
+                                next += 1;
                                 let end = self.ends[other].fetch_sub(1, Ordering::Relaxed);
                                 self.places[end as usize - 1].store(entry as u32, Ordering::Relaxed);
                             }
@@ -223,14 +226,6 @@ impl Task for FillTask<'_> {
             }
         }
         Ok(())
-    }
-}
-
-impl FillTask<'_> {
-    #[inline(always)]
-    fn put(&self, next: &mut usize, other: usize) {
-        self.places[*next].store(other as u32, Ordering::Relaxed);
-        *next += 1;
     }
 }
 
