@@ -41,7 +41,7 @@ void main() {
         // The barrier may be this very sphere, rounded another way.
         is_found = chord.y > 0.0 && at + middle >= clip_depths.x * ray.stretch && at <= last + 1e-6 * abs(chord.x);
         at = min(at, last);
-    } else if (begin < end && cell_clip(leaf, own, begin, end)) {
+    } else if (begin < end && cell_clip(leaf, own, v_sphere, begin, end)) {
         bool ends_inside = barrier < NOWHERE && end >= barrier - middle;
 #if EXACT
         is_inside = leaf_contains(0u, leaf.count, leaf.point + begin * direction);

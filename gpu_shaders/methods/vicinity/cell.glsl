@@ -1,6 +1,7 @@
 // Whose part of space a point is in: that of the ball with the least power |p - c|^2 - R^2. Every point of the fluid lies in the
 // influence sphere of that ball, so it is enough if each ball searches its own part. Parts meet in planes: along a ray each is one
 // interval, and the fragments of all balls share a ray among them instead of each searching all of its sphere.
+#include "methods/vicinity/lists.glsl"
 #include "lib/leaf_ball.glsl"
 
 // Beyond the planes by so much, in squares of R and as a share of what was added: rounding leaves no gap.
@@ -8,13 +9,16 @@ const float CELL_MARGIN = 4e-6;
 
 // Cuts [begin, end] down to the part of the ball with the entry 0; false where nothing is left. The nearest neighbours cut most and
 // come first in the list.
-bool cell_clip(Leaf leaf, LeafBall own, inout float begin, inout float end) {
+bool cell_clip(Leaf leaf, LeafBall own, vec4 own_sphere, inout float begin, inout float end) {
     // In radii of the ball, from its own middle.
     float scale = own.inverse;
     float first = (begin - own.middle) * scale, last = (end - own.middle) * scale;
     float low = first, high = last;
     for (uint i = 1u; i < min(leaf.count, MOST_ENTRIES); i++) {
         vec4 sphere = leaf_sphere(i);
+        // Of equal spheres the first has the part of all.
+        if (sphere == own_sphere && leaf_place(i) < leaf_place(0u))
+            return false;
         vec3 to_center = (sphere.xyz - leaf.point) * scale;
         float along = dot(to_center, leaf.direction);
         vec3 apart = to_center - along * leaf.direction;
