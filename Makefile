@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-viewport bench-export bench-gourmel bench-mishima bench-light bench-scaling lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-light bench-scaling lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -50,8 +50,14 @@ bench-light: setup ## Time primary rays, shadows, occlusion and reflections on t
 bench-gourmel: setup ## Time traced light on the scenes of docs/gourmel_2010.md (ARGS="--scenes pool --pictures")
 	@PYTHONPATH=tests $(VENV) -m bench.gourmel_2010 $(ARGS)
 
+bench-methods: setup ## Compare all methods on the scene of docs/methods.md (ARGS=--pictures renders its pictures)
+	@PYTHONPATH=tests $(VENV) -m bench.methods $(ARGS)
+
 bench-mishima: setup ## Time Equal Interval on the scenes of docs/mishima_2008.md (ARGS="--balls 4096 --pictures")
 	@PYTHONPATH=tests $(VENV) -m bench.mishima_2008 $(ARGS)
+
+bench-mueller: setup ## Time the methods and data sets of docs/mueller_2007.md (ARGS="--scenes ethane --pictures")
+	@PYTHONPATH=tests $(VENV) -m bench.mueller_2007 $(ARGS)
 
 bench-export: setup ## Time passes and files beside the surface, and watch the memory over 500 frames (ARGS="--frames 10")
 	@PYTHONPATH=tests $(VENV) -m bench.export $(ARGS)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import judge as judging
 import numpy as np
 import pytest
-from judge import EXACT, compare, judge
+from judge import EXACT, judge
 from scenes import SCENES, Scene
 from test_random_views import random_scene
 
@@ -63,13 +63,14 @@ def test_the_error_falls_with_the_square_of_the_step():
         image = rendered(scene, camera, **settings)
         assert np.count_nonzero(image.hit != exact.hit) <= 2
         both = image.hit & exact.hit
-        return np.median(np.abs(image["depth"][both] - exact["depth"][both]))
+        # Where one ball alone makes the surface it is exact.
+        return np.percentile(np.abs(image["depth"][both] - exact["depth"][both]), 80)
 
-    errors = np.array([typical_error(samples=samples, bisections=0) for samples in (8, 16, 32)])
+    errors = np.array([typical_error(samples=samples, bisections=0) for samples in (32, 64, 128)])
     assert np.all(np.log2(errors[:-1] / errors[1:]) > 1.7), errors
     # Two bisections are as good as four times the samples.
-    assert 0.5 < typical_error(samples=8, bisections=2) / errors[2] < 2
-    assert typical_error(samples=8, bisections=20) < 1e-5
+    assert 0.5 < typical_error(samples=32, bisections=2) / errors[2] < 2
+    assert typical_error(samples=32, bisections=20) < 1e-5
 
 
 def test_nothing_is_missed_at_the_rims_of_balls():

@@ -8,7 +8,7 @@ import pytest
 
 import meniscus
 from meniscus.addon.fluid.errors import InputError, OutputError
-from meniscus.samples import argon, block, jets, lennard_jones, molecule, peptide, scattered, shell, store
+from meniscus.samples import argon, block, ethane, jets, lennard_jones, molecule, peptide, scattered, shell, store
 
 
 def distances_to_all(positions, box=np.inf):
@@ -236,6 +236,34 @@ def test_argon_is_the_same_for_the_same_seed_also_when_it_is_computed_anew(short
 def test_argon_refuses_a_frame_that_it_has_not(short_argon, frame):
     with pytest.raises(InputError, match="from 1 to 6"):
         argon.balls(400, frame=frame)
+
+
+def test_molecules_of_ethane_are_rigid_and_keep_their_energy():
+    simulation = ethane.Dumbbells(ethane.droplets_in_vapour(300, np.random.default_rng(2)))
+    simulation.keep_bonds()
+    for _ in range(60):
+        simulation.step(ethane.TEMPERATURE)
+
+    def energy():
+        return simulation.potential_energy() + 0.5 * np.sum(simulation.gas.velocities**2)
+
+    before = energy()
+    for _ in range(60):
+        simulation.step()
+    assert abs(energy() - before) < 2e-3 * abs(before)
+    bonds = simulation.gas.positions[1::2] - simulation.gas.positions[::2]
+    bonds -= simulation.gas.box * np.rint(bonds / simulation.gas.box)
+    np.testing.assert_allclose(np.linalg.norm(bonds, axis=1), ethane.BOND, rtol=1e-9)
+
+
+def test_ethane_is_droplets_in_vapour(empty_store, monkeypatch):
+    monkeypatch.setattr(ethane, "STEPS", 30)
+    sites = ethane.balls(1000)
+    near = np.count_nonzero(distances_to_all(sites.positions / ethane.SIGMA) < 2 * ethane.RADIUS, axis=1) - 1
+    assert near.max() > 50
+    assert np.count_nonzero(near == 1) > 10, "a lone molecule has two sites"
+    with pytest.raises(InputError, match="even number of sites"):
+        ethane.balls(1001)
 
 
 def test_a_file_is_made_once_for_each_set_of_parameters(empty_store):
