@@ -81,6 +81,21 @@ def test_nothing_is_missed_at_the_rims_of_balls():
     assert np.count_nonzero(few.hit != many.hit) <= 2
 
 
+def test_nothing_is_lost_where_the_surface_leaves_a_kernel_sphere():
+    """A hole opened where the surface was nearer to a kernel sphere than distances are rounded: the depth test dropped it."""
+    random = np.random.default_rng(3)
+    scene = Scene(
+        meniscus.Balls(20 * random.random((120, 3)) / 6 + [7, 5, 3], 1.0), (8.6, -6.0, 4.6), (8.6, 6.6, 4.6), view_height=4.0
+    )
+    camera = replace(scene.camera("perspective"), width=240, height=240)
+    reference = meniscus.render(scene.balls, camera, scene.field, method="tile_caster")
+    for samples in (50, 100, 400, 999):
+        image = rendered(scene, camera, samples=samples)
+        assert np.count_nonzero(image.hit != reference.hit) <= 1
+        both = image.hit & reference.hit
+        assert np.count_nonzero(np.abs(image["depth"] - reference["depth"])[both] > 1e-3) <= 2
+
+
 def test_small_balls_in_a_large_one_are_not_missed():
     """A plate far thinner than the steps in the large ball: its balls have parts of their own, with steps of their own."""
     across = np.stack(np.meshgrid(np.linspace(-1, 1, 21), [0.0], np.linspace(-1, 1, 21)), axis=-1).reshape(-1, 3)

@@ -41,7 +41,7 @@ void main() {
         // The barrier may be this very sphere, rounded another way.
         is_found = chord.y > 0.0 && at + middle >= clip_depths.x * ray.stretch && at <= last + 1e-6 * abs(chord.x);
         at = min(at, last);
-    } else if (begin < end && cell_clip(leaf, own, v_sphere, begin, end)) {
+    } else if (begin < end && cell_clip(leaf, own, v_sphere, abs(middle) + length(leaf.point), begin, end)) {
         bool ends_inside = barrier < NOWHERE && end >= barrier - middle;
 #if EXACT
         is_inside = leaf_contains(0u, leaf.count, leaf.point + begin * direction);
@@ -56,7 +56,8 @@ void main() {
     }
     if (!is_found)
         discard;
-    float t = middle + at;
+    // To the last digit, or the depth test would drop what lies on the barrier.
+    float t = min(middle + at, barrier);
     LeafSurface surface =
         leaf_surface(0u, leaf.count, leaf.point + at * direction, direction * (is_inside ? 1.0 : -1.0));
     out_depth = min(anchor_depth + t / ray.stretch, DEPTH_BACKGROUND);

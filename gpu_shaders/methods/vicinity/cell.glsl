@@ -4,16 +4,22 @@
 #include "methods/vicinity/lists.glsl"
 #include "lib/leaf_ball.glsl"
 
-// Beyond the planes by so much, in squares of R and as a share of what was added: rounding leaves no gap.
+// Parts reach beyond the planes by so many radii: two balls must not both take a crossing for one of the other, as each finds the
+// density by other roundings.
+const float CELL_OVERLAP = 1e-3;
+// The same as shares: of the squares of lengths that were added, and of the distance from the eye and from the scene's origin.
 const float CELL_MARGIN = 4e-6;
+const float CELL_ROUNDING = 2e-6;
 
 // Cuts [begin, end] down to the part of the ball with the entry 0; false where nothing is left. The nearest neighbours cut most and
-// come first in the list.
-bool cell_clip(Leaf leaf, LeafBall own, vec4 own_sphere, inout float begin, inout float end) {
+// come first in the list. `far`: how far coordinates on the ray are from where they count from.
+bool cell_clip(Leaf leaf, LeafBall own, vec4 own_sphere, float far, inout float begin, inout float end) {
     // In radii of the ball, from its own middle.
     float scale = own.inverse;
     float first = (begin - own.middle) * scale, last = (end - own.middle) * scale;
     float low = first, high = last;
+    float rounding = CELL_ROUNDING * far * scale;
+    float overlap = CELL_OVERLAP + rounding;
     for (uint i = 1u; i < min(leaf.count, MOST_ENTRIES); i++) {
         vec4 sphere = leaf_sphere(i);
         // Of equal spheres the first has the part of all.
@@ -26,7 +32,7 @@ bool cell_clip(Leaf leaf, LeafBall own, vec4 own_sphere, inout float begin, inou
         // 2 delta u <= square, where u is the distance from the own middle.
         float away_2 = dot(apart, apart), radius_2 = radius * radius;
         float square = delta * delta + own.peak + away_2 - radius_2;
-        square += CELL_MARGIN * (1.0 + delta * delta + away_2 + radius_2);
+        square += CELL_MARGIN * (1.0 + delta * delta + away_2 + radius_2) + rounding * (1.0 + radius);
         if (abs(delta) > 1e-6) {
             float plane = 0.5 * square / delta;
             if (delta > 0.0)
@@ -36,13 +42,13 @@ bool cell_clip(Leaf leaf, LeafBall own, vec4 own_sphere, inout float begin, inou
         } else if (square < -1e-5) {
             return false;
         }
-        if (low >= high)
+        if (low > high + 2.0 * overlap)
             return false;
     }
     // What is not cut stays what it is, to the last digit.
     if (low > first)
-        begin = own.middle + low / scale;
+        begin = max(begin, own.middle + (low - overlap) / scale);
     if (high < last)
-        end = own.middle + high / scale;
+        end = min(end, own.middle + (high + overlap) / scale);
     return begin < end;
 }
