@@ -13,6 +13,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "Balls": ".addon.fluid.balls",
+    "colored_by_cluster": ".addon.render.cluster_numbers",
     "Camera": ".addon.fluid.camera",
     "DeepImage": ".addon.fluid.deep_image",
     "DensityProfile": ".addon.fluid.density_profile",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from textwrap import wrap
 from typing import ClassVar
 
@@ -225,7 +226,8 @@ class MENISCUS_PT_sidebar_statistics(_SidebarPanel, bpy.types.Panel):
     bl_parent_id = "MENISCUS_PT_sidebar"
     bl_options: ClassVar[set[str]] = _CLOSED
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.meniscus, "show_clusters")
         if STATUS.info is None:
             self.layout.label(text="Nothing has been drawn yet.")
         else:
@@ -494,6 +496,7 @@ def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
     ]
     if "balls_drawn" in info.counts:
         lines.append(("Drawn", f"{info.counts['balls_drawn']:,}"))
+    lines += cluster_lines(info.counts)
     if info.counts.get("unfinished"):
         lines.append(("Unfinished", f"{info.counts['unfinished']:,} pixels"))
     lines += [
@@ -508,6 +511,19 @@ def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
         _draw_text(layout, note, "ERROR")
     if SHARING.problem and info.backend == "gpu":
         _draw_text(layout, f"{SHARING.problem}.", "INFO")
+
+
+def cluster_lines(counts: Mapping[str, int]) -> list[tuple[str, str]]:
+    """Names and values of what is known of clusters; nothing where they were not asked for."""
+    if "clusters" not in counts:
+        return []
+    largest = counts["largest_cluster"]
+    share = largest / max(counts["balls"], 1)
+    return [
+        ("Clusters", f"{counts['clusters']:,}"),
+        ("Largest", f"{largest:,} balls, {share:.1%}"),
+        ("Lone Droplets", f"{counts['lone_droplets']:,}"),
+    ]
 
 
 def _columns(layout: bpy.types.UILayout) -> tuple[bpy.types.UILayout, bpy.types.UILayout]:

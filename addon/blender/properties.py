@@ -120,6 +120,7 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
             ("LOOK", "Scene", "The surface colour of the scene", 0),
             ("FIXED", "Fixed", "The same colour for all", 1),
             ("ATTRIBUTE", "Attribute", "A colour on each point", 2),
+            ("CLUSTER", "Cluster", "A colour for each connected liquid of the scene, by its number in the pass Cluster ID", 3),
         ),
         default="LOOK",
         update=note_source,
@@ -167,6 +168,12 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         max=240,
         soft_min=10,
         soft_max=60,
+        update=note_display,
+    )
+    show_clusters: BoolProperty(
+        name="Count Clusters",
+        description="Find how many connected liquids the fluid has, beside each image of the viewports",
+        default=False,
         update=note_display,
     )
     version: IntProperty(
@@ -452,6 +459,7 @@ class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
     use_pass_velocity: BoolProperty(name="Velocity", description=PASSES["velocity"].description)
     use_pass_speed: BoolProperty(name="Speed", description=PASSES["speed"].description)
     use_pass_ball_id: BoolProperty(name="Ball ID", description=PASSES["ball_id"].description)
+    use_pass_cluster_id: BoolProperty(name="Cluster ID", description=PASSES["cluster_id"].description)
 
 
 _OWNERS = (

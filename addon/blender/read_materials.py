@@ -27,7 +27,8 @@ def read_source(
     """
     is_holdout = item.is_holdout or item.original.holdout_get(view_layer=view_layer)
     read = _material_of_source(item, view_layer, settings) if uses_materials else Material()
-    return FluidSource(item.name, item.pass_index, read, is_holdout)
+    has_cluster_colors = item.meniscus.color_mode == "CLUSTER"
+    return FluidSource(item.name, item.pass_index, read, is_holdout, has_cluster_colors)
 
 
 def _material_of_source(item: bpy.types.Object, view_layer: bpy.types.ViewLayer, settings: bpy.types.PropertyGroup) -> Material:

@@ -24,6 +24,11 @@ from .read_points import read_points
 from .visible_sources import Source, settings_of, visible_sources
 
 
+def cluster_sources(sources: Sequence[FluidSource]) -> tuple[int, ...]:
+    """Indices of the sources whose balls take the colours of clusters."""
+    return tuple(index for index, source in enumerate(sources) if source.has_cluster_colors)
+
+
 @dataclass(frozen=True)
 class Fluid:
     """All balls of a scene, the objects that they come from by :attr:`Balls.sources`, and what the reader has noted."""
@@ -31,6 +36,11 @@ class Fluid:
     balls: Balls
     sources: tuple[FluidSource, ...]
     notes: tuple[str, ...] = ()
+
+    @property
+    def cluster_sources(self) -> tuple[int, ...]:
+        """Whose balls are to be coloured by :func:`cluster_numbers.colored_by_cluster`."""
+        return cluster_sources(self.sources)
 
 
 @dataclass(frozen=True)
@@ -42,8 +52,10 @@ class FluidParts:
     scene_color: tuple[float, float, float]
 
     def joined(self) -> Fluid:
-        """All together."""
-        return Fluid(_joined(self.parts, self.scene_color), self.sources)
+        """All together. What will be coloured by clusters has the scene's colour so far."""
+        chosen = cluster_sources(self.sources)
+        parts = [replace(part, colors=self.scene_color) if part.source in chosen else part for part in self.parts]
+        return Fluid(_joined(parts, self.scene_color), self.sources)
 
 
 def read_fluid(

@@ -14,6 +14,7 @@ from typing import Any
 
 import bpy
 
+from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.cryptomatte import Coverage
 from ..fluid.deep_image import DeepImage
@@ -24,6 +25,7 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.meshes import Meshes
 from ..fluid.passes import PASSES
 from ..render.backdrop import Surroundings
+from ..render.cluster_numbers import colored_by_cluster
 from ..render.deep import render_deep
 from ..render.image_memory import ImageMemory
 from ..render.method import timed
@@ -205,7 +207,7 @@ class SceneRender:
         """The fluid in depth, without motion blur; what hides it ends it. The errors are those of :meth:`image`."""
         moment, settings = self.moment, self.settings
         return render_deep(
-            moment.fluid.balls,
+            self._balls(moment, control),
             moment.camera,
             moment.field,
             **settings.choice.options,
@@ -214,6 +216,13 @@ class SceneRender:
             threads=settings.threads,
             backdrop=moment.backdrop(moment.camera, settings.threads, control),
         )
+
+    def _balls(self, moment: _Moment, control: Control) -> Balls:
+        """With the colours of clusters where sources ask for these."""
+        chosen, threads = moment.fluid.cluster_sources, self.settings.threads
+        if not chosen:
+            return moment.fluid.balls
+        return colored_by_cluster(moment.fluid.balls, moment.field, chosen, threads=threads, watch=control.watch)
 
     def _shot(
         self,
@@ -225,7 +234,7 @@ class SceneRender:
         sample: int = 0,
     ) -> ImageBuffers:
         return render(
-            moment.fluid.balls,
+            self._balls(moment, control),
             camera,
             moment.field,
             **self.settings.choice.options,

@@ -32,7 +32,7 @@ from .method_settings import read_choice
 from .preferences import preferences
 from .presenter import UNCHANGED, Place, Presenter
 from .read_lighting import read_lighting
-from .read_scene import read_field, read_look
+from .read_scene import Fluid, read_field, read_look
 from .scene_balls import SceneBalls
 from .scene_notes import collected_notes
 from .surroundings_of_view import ViewSurroundings
@@ -189,7 +189,7 @@ class ViewportDrawing:
         if seen is None:
             viewport.drawn = viewport.live.revision
             return
-        view = _view(context.scene, balls, seen, look, surroundings)
+        view = _view(context.scene, fluid, seen, look, surroundings)
         if view.choice.backend != "cpu":
             SHARING.begin()
         viewport.live.show(view)
@@ -282,8 +282,8 @@ def _bounds(balls: Balls, meshes: Meshes | None) -> npt.NDArray[np.float64]:
     return np.array([low.min(axis=0), high.max(axis=0)])
 
 
-def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look, surroundings: Surroundings | None) -> View:
-    settings, chosen, style = scene.meniscus, preferences(), LOOK_STYLES[look.style]
+def _view(scene: bpy.types.Scene, fluid: Fluid, seen: ViewCamera, look: Look, surroundings: Surroundings | None) -> View:
+    balls, settings, chosen, style = fluid.balls, scene.meniscus, preferences(), LOOK_STYLES[look.style]
     return View(
         balls,
         seen.camera.cropped(),
@@ -295,6 +295,8 @@ def _view(scene: bpy.types.Scene, balls: Balls, seen: ViewCamera, look: Look, su
         else None,
         look=look if style.uses_scene else None,
         surroundings=surroundings,
+        cluster_sources=fluid.cluster_sources,
+        counts_clusters=settings.show_clusters,
         choice=read_choice(scene),
         threads=chosen.threads,
         samples=settings.preview_samples,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -110,6 +111,14 @@ class Balls:
         if self.velocities is None or not len(self):
             return 0.0
         return float(np.sqrt(np.max(np.einsum("ij,ij->i", self.velocities, self.velocities))))
+
+    def with_colors(self, colors: npt.ArrayLike) -> Balls:
+        """The same balls, of which all else is shared, with other colours: (N, 3) or one colour (3,), linear Rec.709."""
+        column = np.ascontiguousarray(_column("colors", colors, len(self), (3,))).view()
+        column.flags.writeable = False
+        changed = copy(self)
+        changed.colors = column
+        return changed
 
     def __len__(self) -> int:
         return len(self.positions)

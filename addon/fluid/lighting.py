@@ -160,12 +160,15 @@ class FluidSource:
         Its first material's.
     is_holdout
         Whether its fluid leaves a hole in the image.
+    has_cluster_colors
+        Whether its balls take the colours of the connected liquids that they are in.
     """
 
     name: str = ""
     pass_index: int = 0
     material: Material = Material()
     is_holdout: bool = False
+    has_cluster_colors: bool = False
 
 
 @dataclass(frozen=True)

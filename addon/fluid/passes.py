@@ -64,6 +64,14 @@ PASSES: dict[str, Pass] = {
         Pass("velocity", "Velocity", "XYZ", 0.0, False, "Blended velocity of the balls, world space, Blender units a second"),
         Pass("speed", "Speed", "X", 0.0, False, "Length of the velocity, Blender units a second"),
         Pass("ball_id", "Ball ID", "X", -1.0, False, "Id, else index, of the ball with the greatest share of the density"),
+        Pass(
+            "cluster_id",
+            "Cluster ID",
+            "X",
+            -1.0,
+            False,
+            "Number of the connected liquid, 1 for that of the most balls, 0 where the greatest share has a ball of none",
+        ),
     )
 }
 

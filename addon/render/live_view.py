@@ -22,6 +22,7 @@ from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
 from ..fluid.look import Look
 from .backdrop import Surroundings
+from .cluster_numbers import colored_by_cluster, number_clusters
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
 from .method import timed
@@ -58,6 +59,10 @@ class View:
         Colours and light of the Combined pass; None where it is not among the passes.
     surroundings
         What else there is in the scene; None where the look knows nothing of that.
+    cluster_sources
+        Whose balls take the colours of the clusters, see :func:`cluster_numbers.colored_by_cluster`; the balls have colours then.
+    counts_clusters
+        Whether the reports of images count the clusters.
     choice
         Of the method; what it has to hold a pace with counts while views change.
     threads
@@ -78,6 +83,8 @@ class View:
     contrast_radius: float | None = None
     look: Look | None = None
     surroundings: Surroundings | None = None
+    cluster_sources: tuple[int, ...] = ()
+    counts_clusters: bool = False
     choice: MethodChoice = MethodChoice()
     threads: int = 0
     samples: int = 8
@@ -96,7 +103,7 @@ class View:
     def _means(self) -> tuple[object, ...]:
         return (
             *(self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.surroundings),
-            self.choice,
+            *(self.cluster_sources, self.counts_clusters, self.choice),
         )
 
     @property
@@ -114,7 +121,7 @@ class View:
     @property
     def most_pictures(self) -> int:
         """How many samples fit into the memory."""
-        known = {"depth": 1, "ball_id": 1, "combined": 4}
+        known = {"depth": 1, "ball_id": 1, "cluster_id": 1, "combined": 4}
         channels = sum(known.get(name, 3) for name in self.passes)
         each = self.camera.width * self.camera.height * channels * _BYTES_PER_CHANNEL
         return max(1, min(self.samples, self.memory_limit // each))
@@ -186,7 +193,8 @@ class LiveView:
             else:
                 self._view, self._failure, self._asked_at = view, None, time.monotonic()
             self._changed.notify_all()
-        if is_next:
+        # A tree is made of the balls that are rendered, and those with the colours of clusters are still to be made.
+        if is_next and not view.cluster_sources:
             # The thread may still draw what was asked for before.
             self._prepare(view.balls, view.field, view.choice.method, view.choice.backend, view.threads)
 
@@ -341,9 +349,11 @@ class LiveRenderer:
         look, choice = (view.look_while_moving, view.choice) if is_first else (view.look, view.choice.unhurried)
         milliseconds: dict[str, float] = {}
         try:
+            # It takes as long for small images: the pace knows nothing of it.
+            balls = _balls(view, watch_of(is_cancelled, None))
             with timed(milliseconds, "picture"):
                 image = self._render(
-                    view.balls,
+                    balls,
                     camera,
                     view.field,
                     **choice.options,
@@ -380,6 +390,15 @@ class LiveRenderer:
                 or not view.shows_the_same(live._view)
                 or any(other._stage() == 0 for other in self._views)
             )
+
+
+def _balls(view: View, watch: Callable[[float], None]) -> Balls:
+    """The balls of a view as they are rendered; their clusters are known if the view wants to count them."""
+    if view.cluster_sources:
+        return colored_by_cluster(view.balls, view.field, view.cluster_sources, threads=view.threads, watch=watch)
+    if view.counts_clusters:
+        number_clusters(view.balls, view.field, threads=view.threads, watch=watch)
+    return view.balls
 
 
 def _picture(image: ImageBuffers | DeviceImage, view: View, is_hurried: bool) -> Picture:

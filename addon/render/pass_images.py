@@ -15,6 +15,7 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import DEPTH_BACKGROUND, PASSES
 from ..fluid.tracing import Tracing
 from . import native
+from .cluster_numbers import number_clusters
 from .depth_contrast import spatial_importance
 from .material_shading import shade_image
 from .method import Attribute, Request, Surface
@@ -34,6 +35,7 @@ NEEDED: dict[str, Attribute] = {
     "speed": "velocity",
     "vector": "velocity",
     "ball_id": "ball",
+    "cluster_id": "ball",
     "object_index": "ball",
 }
 
@@ -244,6 +246,13 @@ class PassImages:
         table = np.arange(len(balls), dtype=np.float32) if balls.ids is None else balls.ids.astype(np.float32)
         return self._of_fluid(self._labelled(ball, table, background), "ball_id")
 
+    def _cluster_id(self) -> FloatArray:
+        request, ball, background = self._request, self._surface.ball, PASSES["cluster_id"].background
+        if ball is None:
+            return np.full(self.hit.shape, background, np.float32)
+        found = number_clusters(request.balls, request.field, threads=request.threads, watch=request.watch)
+        return self._of_fluid(self._labelled(ball, found.numbers.astype(np.float32), background), "cluster_id")
+
     def _labelled(self, index: npt.NDArray[np.int32], table: FloatArray, background: float) -> FloatArray:
         """(height, width): the number in a table that each pixel's index stands for, the background where it is negative."""
         image = self._memory.empty(index.shape, np.float32)
@@ -385,5 +394,6 @@ _MAKERS: dict[str, Callable[[PassImages], FloatArray]] = {
     "velocity": lambda made: made._of_fluid(made._velocity, "velocity"),
     "speed": lambda made: made._places["speed"],
     "ball_id": lambda made: made._ball_id(),
+    "cluster_id": lambda made: made._cluster_id(),
 }
 """How each pass is made."""

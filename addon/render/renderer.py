@@ -18,6 +18,7 @@ from ..fluid.image import ImageBuffers, RenderInfo
 from ..fluid.kernels import PolynomialKernel
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES, checked_passes
+from .cluster_numbers import known_counts
 from .device_image import DeviceImage
 from .device_tracing import trace_image_on_device
 from .image_memory import ImageMemory
@@ -239,7 +240,7 @@ class _Shot:
         info = self.choice.info
         report = RenderInfo(info.name, info.backend, self.choice.runner.device, self.choice.reason, dropped=dict(balls.dropped))
         report.milliseconds = dict(surface.milliseconds)
-        report.counts = {"balls": len(balls), **surface.counts}
+        report.counts = {"balls": len(balls), **surface.counts, **known_counts(balls, self.request.field)}
         if unfinished := surface.counts.get("unfinished"):
             report.notes = (f"{unfinished} pixels were left out because the method reached its limits there; raise these",)
         return report
@@ -252,6 +253,7 @@ class _Shot:
             made = PassImages(surface, *given, self.choice.tracer)
             images = {name: _in_whole_image(made[name], self.camera, PASSES[name].background) for name in self.passes}
             objects = _in_whole_image(made.objects, self.camera, -1) if "object_index" in self.passes else None
+            report.counts |= known_counts(self.request.balls, self.request.field)
             return ImageBuffers(self.camera, images, _in_whole_image(made.hit, self.camera, False), report, objects)
 
 

@@ -12,6 +12,7 @@ import meniscus
 from meniscus.addon.fluid.errors import CancelledError, DeviceError
 from meniscus.addon.fluid.image import ImageBuffers, RenderInfo
 from meniscus.addon.fluid.tracing import Tracing
+from meniscus.addon.render.cluster_numbers import known_counts
 from meniscus.addon.render.live_view import LiveRenderer, View
 from meniscus.addon.render.method_choice import MethodChoice
 from meniscus.addon.render.pace import Pace
@@ -116,6 +117,8 @@ def test_the_same_view_is_not_rendered_again(renderer, fake):
         {"camera": meniscus.Camera.perspective((0, -5, 0), (0, 0, 0), width=1000, height=600)},
         {"choice": MethodChoice(backend="cpu")},
         {"choice": MethodChoice("fitted_bvh", settings={"step": 2})},
+        {"cluster_sources": (0,)},
+        {"counts_clusters": True},
     ],
 )
 def test_whatever_changes_the_image_asks_for_a_new_one(renderer, fake, change):
@@ -373,3 +376,21 @@ def test_what_holds_the_pace_counts_only_while_a_view_moves(renderer, fake, monk
     assert asked == [{"step": 3, "budget": 0.5}, {"step": 3}, {"step": 3}]
     assert fake.widths == [100] * 3
     assert [picture.is_hurried for picture in live.pictures] == [False] * 2
+
+
+def test_balls_take_the_colours_of_their_clusters_beside_the_interface(renderer, fake):
+    """Two drops; the thread that renders colours and counts them, and the balls that were given stay what they are."""
+    fluid = meniscus.Balls([[-2, 0, 0], [2, 0, 0]], 0.9, colors=(0.5, 0.5, 0.5), sources=[0, 1])
+    given = []
+    live = renderer.open()
+    original = renderer._render
+    renderer._render = lambda balls, *others, **named: given.append(balls) or original(balls, *others, **named)
+    live.show(replace(VIEW, balls=fluid, cluster_sources=(1,)))
+    rest(live)
+    expected = meniscus.colored_by_cluster(fluid, VIEW.field, (1,))
+    assert set(given) == {expected}
+    assert expected.colors[0].tolist() == [0.5, 0.5, 0.5]
+    live.show(replace(VIEW, balls=fluid, counts_clusters=True))
+    rest(live)
+    assert given[-1] is fluid
+    assert known_counts(fluid, VIEW.field)["clusters"] == 2
