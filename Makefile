@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-light bench-scaling lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-clusters bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-light bench-scaling lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -37,6 +37,9 @@ bench-peers: setup ## Time what users have today beside Meniscus, and judge both
 
 bench-pictures: setup ## Render the pictures of docs/kanamori_2008.md anew (ARGS="--only figure_1")
 	@PYTHONPATH=tests $(VENV) -m bench.paper_pictures $(ARGS)
+
+bench-clusters: setup ## Render the picture of docs/clusters.md anew (ARGS="--frame 30")
+	@PYTHONPATH=tests $(VENV) -m bench.cluster_pictures $(ARGS)
 
 bench-viewport: extension ## Time the viewport in real windows with 120,000 particles (ARGS="--windows blender-5.2-vulkan")
 	@PYTHONPATH=tests:tools $(VENV) -m bench.viewport $(ARGS)

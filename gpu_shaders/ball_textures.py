@@ -12,9 +12,10 @@ import numpy.typing as npt
 from ..addon.fluid.camera import Camera
 from ..addon.fluid.view_balls import ViewBalls
 from ..addon.render.method import Attribute
-from .image_cells import plain
+from .programs import ROW_TEXTURE_WIDTH
+from .row_texture import Rows, row_texture
 
-BALL_TEXTURE_WIDTH = 4096
+BALL_TEXTURE_WIDTH = ROW_TEXTURE_WIDTH
 
 
 def ball_textures(
@@ -30,7 +31,7 @@ def ball_textures(
     velocities
         (N, 3) world space: of all the balls that `balls` were taken from.
     """
-    arrays: dict[str, npt.NDArray[np.float32] | npt.NDArray[np.int32]] = {
+    arrays: dict[str, Rows] = {
         "sphere_tx": np.column_stack([balls.centers, balls.radii]).astype(np.float32),
         "density_tx": np.column_stack([balls.weights, balls.kernel_radii]).astype(np.float32),
     }
@@ -40,20 +41,11 @@ def ball_textures(
         arrays["velocity_tx"] = _in_four(velocities[balls.indices])
     if "ball" in attributes:
         arrays["index_tx"] = balls.indices.astype(np.int32)[:, None]
-    return {name: _texture_of_rows(gl, array) for name, array in arrays.items()}
+    return {name: row_texture(gl, array) for name, array in arrays.items()}
 
 
 def _in_four(vectors: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     return np.column_stack([vectors, np.ones(len(vectors), np.float32)])
-
-
-def _texture_of_rows(gl: moderngl.Context, rows: npt.NDArray[np.float32] | npt.NDArray[np.int32]) -> moderngl.Texture:
-    """(M, components) as a texture with one texel a row, left to right and on the next line after BALL_TEXTURE_WIDTH."""
-    lines = -(-len(rows) // BALL_TEXTURE_WIDTH)
-    padded = np.zeros((lines * BALL_TEXTURE_WIDTH, rows.shape[1]), rows.dtype)
-    padded[: len(rows)] = rows
-    texture = gl.texture((BALL_TEXTURE_WIDTH, lines), rows.shape[1], padded, dtype=f"{rows.dtype.kind}4")
-    return plain(texture)
 
 
 @dataclass(frozen=True)

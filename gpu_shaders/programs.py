@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from .glsl import Source, explain
 
+ROW_TEXTURE_WIDTH = 4096
+"""Texels on a line of those textures that shaders read row by row."""
+
 _RULER = re.compile(r"[=-]*")
 
 

@@ -20,6 +20,9 @@ OPENGL = frozenset({"moderngl", "glcontext"})
 # What the native core makes for shaders to read.
 TREES = ("addon/render/fitted_bvh", "addon/render/tree_builder")
 
+# What methods on both back-ends show in the place of balls.
+GLYPHS = "addon/render/glyphs"
+
 
 @dataclass(frozen=True)
 class Area:
@@ -41,7 +44,7 @@ AREAS = (
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
     Area(
         "gpu_shaders",
-        ("addon/fluid", *TREES, "addon/render/method", "addon/render/neighbours", "addon/render/settings", "gpu_shaders"),
+        ("addon/fluid", *TREES, GLYPHS, "addon/render/method", "addon/render/neighbours", "addon/render/settings", "gpu_shaders"),
         OPENGL | {"numpy"},
     ),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),

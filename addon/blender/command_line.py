@@ -90,6 +90,7 @@ def _job(options: argparse.Namespace) -> RenderJob:
         passes=tuple(dict.fromkeys((*options.passes, *(("combined",) if options.preview else ())))),
         samples=options.samples,
         choice=read_choice(scene, options.method, options.backend).unhurried.with_written(options.setting),
+        display=options.display,
         camera=_camera(scene, options.camera),
         resolution=options.resolution,
         tracing={

@@ -6,6 +6,7 @@ import argparse
 import re
 from typing import NoReturn
 
+from ..fluid.displays import DISPLAYS
 from ..fluid.errors import InputError
 from ..fluid.passes import PASSES, checked_passes
 from ..output.exr_content import COMPRESSIONS, LAYOUTS
@@ -99,6 +100,9 @@ def _add_render(commands: argparse._SubParsersAction[_Parser]) -> None:
         render.add_argument(
             f"--{name}", type=whole_number, metavar="N", help=f"{what}, with ray tracing; the scene's number if left out"
         )
+    render.add_argument(
+        "--display", choices=tuple(DISPLAYS), help="what the balls are shown as; the scene's choice if left out"
+    )
     render.add_argument("--method", metavar="NAME", help="how the surface is found; the scene's choice if left out")
     render.add_argument(
         "--setting",

@@ -435,7 +435,7 @@ def _draw_color(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
 
 def _draw_surface(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     layout = _split(layout)
-    for name in ("kernel", "isovalue", "method"):
+    for name in ("display", "kernel", "isovalue", "method"):
         layout.prop(settings, name)
     group = group_of(settings, settings.method)
     if group is not None:
@@ -496,6 +496,8 @@ def _draw_statistics(layout: bpy.types.UILayout, info: RenderInfo) -> None:
     ]
     if "balls_drawn" in info.counts:
         lines.append(("Drawn", f"{info.counts['balls_drawn']:,}"))
+    if "glyphs" in info.counts:
+        lines.append(("Glyphs", f"{info.counts['glyphs']:,}"))
     lines += cluster_lines(info.counts)
     if info.counts.get("unfinished"):
         lines.append(("Unfinished", f"{info.counts['unfinished']:,} pixels"))

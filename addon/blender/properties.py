@@ -16,6 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..fluid.displays import DISPLAYS, METABALLS
 from ..fluid.field import Field
 from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
@@ -195,6 +196,13 @@ class MENISCUS_PG_scene(bpy.types.PropertyGroup):
         min=1,
         max=1024,
         soft_max=64,
+    )
+    display: EnumProperty(
+        name="Display",
+        description="What the balls are shown as",
+        items=stable_items((display.name, display.label, display.description) for display in DISPLAYS.values()),
+        default=METABALLS,
+        update=note_display,
     )
     kernel: EnumProperty(
         name="Kernel",

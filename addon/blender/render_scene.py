@@ -18,6 +18,7 @@ from ..fluid.balls import Balls
 from ..fluid.camera import Camera
 from ..fluid.cryptomatte import Coverage
 from ..fluid.deep_image import DeepImage
+from ..fluid.displays import METABALLS
 from ..fluid.errors import CancelledError, InputError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
@@ -68,7 +69,7 @@ class RenderSettings:
         A pixel's, of the antialiased passes.
     choice
         Of the method, see :class:`method_choice.MethodChoice`.
-    threads
+    threads, display
         See :func:`renderer.render`.
     camera
         None for the scene's.
@@ -83,6 +84,7 @@ class RenderSettings:
     samples: int = 1
     choice: MethodChoice = MethodChoice()
     threads: int = 0
+    display: str = METABALLS
     camera: bpy.types.Object | None = None
     resolution: tuple[int, int] | None = None
     tracing: Mapping[str, Any] = field(default_factory=dict)
@@ -96,6 +98,7 @@ class RenderSettings:
             "samples": scene.meniscus.render_samples,
             "choice": read_choice(scene).unhurried,
             "threads": threads_of(scene),
+            "display": scene.meniscus.display,
         }
         return cls(**{**own, **{name: choice for name, choice in choices.items() if choice is not None}})
 
@@ -206,6 +209,8 @@ class SceneRender:
     def deep_image(self, control: Control) -> DeepImage:
         """The fluid in depth, without motion blur; what hides it ends it. The errors are those of :meth:`image`."""
         moment, settings = self.moment, self.settings
+        if settings.display != METABALLS:
+            raise InputError("Deep files hold the inside of metaballs: display the balls as these, or write no deep file")
         return render_deep(
             self._balls(moment, control),
             moment.camera,
@@ -246,6 +251,7 @@ class SceneRender:
             motion=motion,
             memory=control.memory,
             sample=sample,
+            display=self.settings.display,
         )
 
     def _antialias(self, image: ImageBuffers, control: Control) -> None:

@@ -230,7 +230,8 @@ class ViewportDrawing:
     def _report(self, viewport: _Viewport, balls: Balls) -> None:
         pictures = viewport.live.pictures
         if pictures:
-            STATUS.show(pictures[0].image.info, balls.dropped_text, self._transforms.problem, *viewport.notes)
+            info = pictures[0].image.info
+            STATUS.show(info, balls.dropped_text, self._transforms.problem, *viewport.notes, *info.notes)
         STATUS.report(*(viewport.live.failure or ("", "")))
 
     def _tick(self) -> float | None:
@@ -297,6 +298,7 @@ def _view(scene: bpy.types.Scene, fluid: Fluid, seen: ViewCamera, look: Look, su
         surroundings=surroundings,
         cluster_sources=fluid.cluster_sources,
         counts_clusters=settings.show_clusters,
+        display=settings.display,
         choice=read_choice(scene),
         threads=chosen.threads,
         samples=settings.preview_samples,

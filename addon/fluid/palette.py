@@ -14,7 +14,7 @@ _FIRST = ("0072B2", "E69F00", "009E73", "CC79A7", "56B4E9", "D55E00", "F0E442")
 """sRGB: the colours of Okabe and Ito 2008, which colour-blind people tell apart; without black."""
 
 _PLASTIC = 1.324717957244746
-"""The real root of x^3 = x + 1: its powers spread points over a square evenly (Roberts 2018, R2)."""
+"""The real root of x^3 = x + 1: its powers spread points over a square evenly (Roberts 2018, the sequence R2)."""
 
 _LIGHTNESS, _CHROMA = (0.50, 0.86), 0.11
 """Of further colours, in Oklab (Ottosson 2020): from dark to light, and a chroma that nearly all hues have at these."""
@@ -50,7 +50,8 @@ def _spread_colors(numbers: npt.NDArray[np.integer]) -> npt.NDArray[np.float64]:
     steps = numbers[:, None] / np.array([_PLASTIC, _PLASTIC**2]) % 1
     angle, lightness = 2 * np.pi * steps[:, 0], _LIGHTNESS[0] + (_LIGHTNESS[1] - _LIGHTNESS[0]) * steps[:, 1]
     oklab = np.stack([lightness, _CHROMA * np.cos(angle), _CHROMA * np.sin(angle)], axis=1)
-    return np.clip((oklab @ np.array(_LMS_FROM_OKLAB).T) ** 3 @ np.array(_RGB_FROM_LMS).T, 0, 1)
+    rgb = (oklab @ np.array(_LMS_FROM_OKLAB).T) ** 3 @ np.array(_RGB_FROM_LMS).T
+    return np.asarray(np.clip(rgb, 0, 1))
 
 
 def _linear(codes: tuple[str, ...]) -> npt.NDArray[np.float64]:

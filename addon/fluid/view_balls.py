@@ -49,7 +49,7 @@ def view_balls(balls: Balls, camera: Camera, field: Field) -> ViewBalls:
     # Coordinates in rows: products of (3, 3) with (3, N) are fast, those of (N, 3) with (3, 3) are not.
     centers = (rotation.T @ (balls.positions.T - camera.eye[:, None])).T
     radii = balls.radii.astype(np.float64)
-    seen = _meets_view(centers, radii, camera)
+    seen = meets_view(centers, radii, camera)
     weights = balls.weights[seen].astype(np.float64)
     return ViewBalls(
         centers[seen],
@@ -61,7 +61,7 @@ def view_balls(balls: Balls, camera: Camera, field: Field) -> ViewBalls:
     )
 
 
-def _meets_view(centers: FloatArray, radii: FloatArray, camera: Camera) -> npt.NDArray[np.bool_]:
+def meets_view(centers: FloatArray, radii: FloatArray, camera: Camera) -> npt.NDArray[np.bool_]:
     """Conservative: whether each sphere reaches past all six planes of the view."""
     x, y, depth = centers[:, 0], centers[:, 1], -centers[:, 2]
     seen = (depth + radii > camera.clip_start) & (depth - radii < camera.clip_end)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
+from ..fluid.displays import METABALLS
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers
@@ -60,12 +61,12 @@ class View:
     surroundings
         What else there is in the scene; None where the look knows nothing of that.
     cluster_sources
-        Whose balls take the colours of the clusters, see :func:`cluster_numbers.colored_by_cluster`; the balls have colours then.
+        Whose balls take the colours of clusters, see :func:`cluster_numbers.colored_by_cluster`; the balls have colours then.
     counts_clusters
         Whether the reports of images count the clusters.
     choice
         Of the method; what it has to hold a pace with counts while views change.
-    threads
+    display, threads
         As for :func:`renderer.render`.
     samples
         How many samples a pixel gets at last, 1 for no antialiasing.
@@ -85,6 +86,7 @@ class View:
     surroundings: Surroundings | None = None
     cluster_sources: tuple[int, ...] = ()
     counts_clusters: bool = False
+    display: str = METABALLS
     choice: MethodChoice = MethodChoice()
     threads: int = 0
     samples: int = 8
@@ -103,7 +105,7 @@ class View:
     def _means(self) -> tuple[object, ...]:
         return (
             *(self.field, self.passes, self.uses_thickness, self.contrast_radius, self.look, self.surroundings),
-            *(self.cluster_sources, self.counts_clusters, self.choice),
+            *(self.cluster_sources, self.counts_clusters, self.display, self.choice),
         )
 
     @property
@@ -194,7 +196,7 @@ class LiveView:
                 self._view, self._failure, self._asked_at = view, None, time.monotonic()
             self._changed.notify_all()
         # A tree is made of the balls that are rendered, and those with the colours of clusters are still to be made.
-        if is_next and not view.cluster_sources:
+        if is_next and not view.cluster_sources and view.display == METABALLS:
             # The thread may still draw what was asked for before.
             self._prepare(view.balls, view.field, view.choice.method, view.choice.backend, view.threads)
 
@@ -366,6 +368,7 @@ class LiveRenderer:
                     if view.surroundings is None
                     else view.surroundings.backdrop(camera, view.threads, watch_of(is_cancelled, None)),
                     sample=sample,
+                    display=view.display,
                 )
                 picture = _picture(image, view, is_hurried=is_first and view.hurries)
         except CancelledError:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
+from ..fluid.displays import METABALLS
 from ..fluid.field import Field
 from ..fluid.passes import DEPTH_BACKGROUND
 from .image_memory import ImageMemory
@@ -44,6 +45,8 @@ class MethodInfo:
         What users can set of it.
     any_kernel
         Whether it takes kernels that are no polynomials.
+    displays
+        What it shows balls as, of :data:`displays.DISPLAYS`.
     """
 
     name: str
@@ -54,6 +57,7 @@ class MethodInfo:
     gl_version: int = 0
     settings: tuple[Setting, ...] = ()
     any_kernel: bool = False
+    displays: frozenset[str] = frozenset({METABALLS})
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,8 @@ class Request:
         Where images come from.
     settings
         All settings of the method by name, checked, see :class:`settings.Setting`.
+    display
+        What balls are shown as, one of the method's :attr:`MethodInfo.displays`.
     """
 
     balls: Balls
@@ -84,6 +90,7 @@ class Request:
     watch: Callable[[float], None]
     memory: ImageMemory = dataclasses.field(default_factory=ImageMemory)
     settings: Mapping[str, Value] = dataclasses.field(default_factory=dict)
+    display: str = METABALLS
 
     @property
     def known_attributes(self) -> tuple[Attribute, ...]:
@@ -136,6 +143,23 @@ class Surface:
     def hit(self) -> npt.NDArray[np.bool_]:
         """(height, width): where there is a surface."""
         return self.depth < DEPTH_BACKGROUND
+
+
+def unfilled_surface(request: Request) -> Surface:
+    """A surface in the request's memory, with all that it asks for and the balls carry; the method has to write every pixel."""
+    shape = (request.camera.height, request.camera.width)
+    balls, attributes, memory = request.balls, request.attributes, request.memory
+
+    def vectors(is_wanted: bool) -> npt.NDArray[np.float32] | None:
+        return memory.empty((*shape, 3), np.float32) if is_wanted else None
+
+    return Surface(
+        depth=memory.empty(shape, np.float32),
+        normal=memory.empty((*shape, 3), np.float32),
+        color=vectors("color" in attributes and balls.colors is not None),
+        velocity=vectors("velocity" in attributes and balls.velocities is not None),
+        ball=memory.empty(shape, np.int32) if "ball" in attributes else None,
+    )
 
 
 class Method(Protocol):

@@ -22,6 +22,9 @@ _FOLDERS = (
     "gpu_shaders.methods.equal_interval",
     "gpu_shaders.methods.vicinity",
     "gpu_shaders.methods.walking_depth_plane",
+    # What is no metaballs.
+    "gpu_shaders.methods.glyphs",
+    "addon.render.glyph_caster",
 )
 
 
@@ -65,9 +68,13 @@ def _import(folder: str, module: str) -> Any:
     return importlib.import_module(f"{_PACKAGE}.{folder}.{module}")
 
 
-def method_infos() -> list[MethodInfo]:
-    """All registered methods, in order of preference. Loads no GPU module, so the interface may call it at start."""
-    return [_import(folder, "params").METHOD for folder in _FOLDERS]
+def method_infos(display: str | None = None) -> list[MethodInfo]:
+    """All registered methods, or those that show balls in one way (:data:`displays.DISPLAYS`), in order of preference.
+
+    Loads no GPU module, so the interface may call it at start.
+    """
+    infos: list[MethodInfo] = [_import(folder, "params").METHOD for folder in _FOLDERS]
+    return [info for info in infos if display is None or display in info.displays]
 
 
 def method_info(name: str) -> MethodInfo:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ..fluid.balls import Balls
 from ..fluid.camera import Camera
+from ..fluid.displays import METABALLS, check_display
 from ..fluid.errors import CancelledError, DeviceError, InputError, MeniscusError
 from ..fluid.field import Field
 from ..fluid.image import ImageBuffers, RenderInfo
@@ -44,6 +45,9 @@ Element = TypeVar("Element", np.float32, np.bool_, np.int32)
 
 BACKENDS = ("auto", "gpu", "cpu")
 
+UNTRACED = "Light is not traced, because it is among metaballs alone: display the balls as metaballs for that"
+"""What is noted where light was to be traced among other things."""
+
 
 def render(
     balls: Balls,
@@ -61,6 +65,7 @@ def render(
     memory: ImageMemory | None = None,
     sample: int = 0,
     settings: Mapping[str, Value] | None = None,
+    display: str = METABALLS,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -91,6 +96,9 @@ def render(
         noise.
     settings
         Of the method that is named, by their names, see :class:`method.MethodInfo`; what is left out has its default.
+    display
+        What balls are shown as, a name from :data:`displays.DISPLAYS`. Light is traced among metaballs alone, and only they
+        have a thickness.
 
     Returns
     -------
@@ -101,7 +109,7 @@ def render(
     InputError, DeviceError, CancelledError
         Each with one sentence for the user.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings, display)
     request = shot.request if memory is None else replace(shot.request, memory=memory)
     shot = replace(shot, request=request, backdrop=backdrop, motion=motion, sample=sample)
     return shot.image(shot.choice.runner.find_surface(shot.request))
@@ -119,6 +127,7 @@ def render_progressively(
     on_progress: Callable[[float], None] | None = None,
     threads: int = 0,
     settings: Mapping[str, Value] | None = None,
+    display: str = METABALLS,
 ) -> Iterator[ImageBuffers]:
     """Render the surface of a fluid from coarse to fine.
 
@@ -129,7 +138,7 @@ def render_progressively(
     ImageBuffers of the whole image, each finer than the one before; the last is what :func:`render` returns. A method that
     cannot do so yields that one only.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings, display)
     runner = shot.choice.runner
     if isinstance(runner, ProgressiveMethod):
         yield from map(shot.image, runner.find_surfaces(shot.request))
@@ -151,6 +160,7 @@ def render_to_show(
     backdrop: Backdrop | None = None,
     sample: int = 0,
     settings: Mapping[str, Value] | None = None,
+    display: str = METABALLS,
 ) -> ImageBuffers | DeviceImage:
     """Render the surface of a fluid for Blender to draw.
 
@@ -161,7 +171,7 @@ def render_to_show(
     A DeviceImage where the method runs on an OpenGL that shares its textures with Blender's and the passes can stay there, else
     ImageBuffers.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads, settings)
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads, settings, display)
     shot = replace(shot, backdrop=backdrop, sample=sample)
     runner = shot.choice.runner
     can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
@@ -176,7 +186,7 @@ def prepare(balls: Balls, field: Field, method: str, backend: str, threads: int 
     The parameters are those of :func:`render`. Nothing happens where the method cannot run: rendering tells why.
     """
     with suppress(MeniscusError):
-        runner = _pick_method(method, backend, frozenset(), field).runner
+        runner = _pick_method(method, backend, frozenset(), field, METABALLS).runner
         if isinstance(runner, PreparingMethod):
             runner.prepare(balls, field, threads)
 
@@ -190,6 +200,7 @@ class _Shot:
     camera: Camera
     passes: tuple[str, ...]
     look: Look
+    notes: tuple[str, ...] = ()
     backdrop: Backdrop | None = None
     motion: Motion | None = None
     sample: int = 0
@@ -208,22 +219,29 @@ class _Shot:
         on_progress: Callable[[float], None] | None,
         threads: int,
         settings: Mapping[str, Value] | None,
+        display: str,
     ) -> _Shot:
         names = checked_passes(passes)
+        check_display(display)
+        if display != METABALLS and "thickness" in names:
+            raise InputError("Only metaballs have the pass thickness: leave it out, or display the balls as metaballs")
         if threads < 0:
             raise InputError(f"The number of threads must be 0 (one a core) or more, not {threads}")
         look = look or Look()
+        notes: tuple[str, ...] = ()
+        if display != METABALLS and look.tracing is not None:
+            look, notes = replace(look, tracing=None), (UNTRACED,)
         attributes = needed_attributes(names, look)
         if any(source.is_holdout for source in look.sources):
             attributes |= {NEEDED["object_index"]}
         traces = look.tracing is not None and LOOK_STYLES[look.style].uses_scene and "combined" in names
         if traces or "thickness" in names:
             _ = field.polynomial_kernel  # tells now what it would tell after the surface is found
-        choice = _pick_method(method, backend, attributes, field)
+        choice = _pick_method(method, backend, attributes, field, display)
         checked = checked_settings(method, choice.info.settings, settings)
         watch = watch_of(is_cancelled, on_progress)
-        request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked)
-        return cls(choice, request, camera, names, look)
+        request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked, display=display)
+        return cls(choice, request, camera, names, look, notes)
 
     @property
     def can_stay_on_device(self) -> bool:
@@ -239,10 +257,10 @@ class _Shot:
         balls = self.request.balls
         info = self.choice.info
         report = RenderInfo(info.name, info.backend, self.choice.runner.device, self.choice.reason, dropped=dict(balls.dropped))
-        report.milliseconds = dict(surface.milliseconds)
+        report.milliseconds, report.notes = dict(surface.milliseconds), self.notes
         report.counts = {"balls": len(balls), **surface.counts, **known_counts(balls, self.request.field)}
         if unfinished := surface.counts.get("unfinished"):
-            report.notes = (f"{unfinished} pixels were left out because the method reached its limits there; raise these",)
+            report.notes += (f"{unfinished} pixels were left out because the method reached its limits there; raise these",)
         return report
 
     def image(self, surface: Surface) -> ImageBuffers:
@@ -272,16 +290,16 @@ class _Choice:
         return trace_image_on_device if is_hardware else trace_image
 
 
-def _pick_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field) -> _Choice:
-    """The method asked for, or the fastest one that runs here on the back-end asked for, finds these attributes and takes the
-    field's kernel.
+def _pick_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field, display: str) -> _Choice:
+    """The method asked for, or the fastest one that runs here on the back-end asked for, finds these attributes, takes the
+    field's kernel and shows balls in this way.
     """
     if backend not in BACKENDS:
         raise InputError(f"Unknown back-end '{backend}': choose one of {', '.join(BACKENDS)}")
     if method != "auto":
-        return _named_method(method, backend, attributes, field)
+        return _named_method(method, backend, attributes, field, display)
     problems: list[MeniscusError] = []
-    for info in _preferred(backend):
+    for info in _preferred(backend, display):
         try:
             if missing := _passes_without(attributes - info.attributes):
                 raise InputError(f"{info.label} cannot make the pass {missing}; leave the method to Meniscus")
@@ -293,9 +311,12 @@ def _pick_method(method: str, backend: str, attributes: frozenset[Attribute], fi
     raise problems[0]
 
 
-def _preferred(backend: str) -> list[MethodInfo]:
-    """The methods on a back-end, the preferred first; without a choice those on OpenGL that is only software come last."""
-    infos = [info for info in method_infos() if backend in ("auto", info.backend)]
+def _preferred(backend: str, display: str) -> list[MethodInfo]:
+    """The methods for a display on a back-end, the preferred first.
+
+    Without a choice of the back-end those on OpenGL that is only software come last.
+    """
+    infos = [info for info in method_infos(display) if backend in ("auto", info.backend)]
     return sorted(infos, key=_runs_in_software) if backend == "auto" else infos
 
 
@@ -306,8 +327,10 @@ def _runs_in_software(info: MethodInfo) -> bool:
         return False
 
 
-def _named_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field) -> _Choice:
+def _named_method(method: str, backend: str, attributes: frozenset[Attribute], field: Field, display: str) -> _Choice:
     info, runner = create_method(method)
+    if display not in info.displays:
+        raise InputError(f"The method '{method}' does not show {display}: leave the method to Meniscus, or change the display")
     if backend not in ("auto", info.backend):
         raise InputError(f"The method '{method}' runs on the back-end '{info.backend}', not on '{backend}'")
     if missing := _passes_without(attributes - info.attributes):

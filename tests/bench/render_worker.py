@@ -68,6 +68,7 @@ def describe(request: Message) -> Message:
             "is_software": not status.problem and runs_in_software_opengl(status.info),
         }
         for status in meniscus.methods()
+        if "metaballs" in status.info.displays
     ]
     return {"methods": methods, "simd_paths": _simd_paths(), "gl_renderer": _gl_renderer()}
 

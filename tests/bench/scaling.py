@@ -79,7 +79,7 @@ def cases(most_balls: int, size: tuple[int, int]) -> Iterator[Case]:
 def main(arguments: list[str] | None = None) -> None:
     """Measure, print and publish."""
     parser = ArgumentParser(prog="bench-scaling", description="Time methods against balls, resolution, density and kernel.")
-    parser.add_argument("--methods", nargs="+", default=[info.name for info in method_infos()])
+    parser.add_argument("--methods", nargs="+", default=[info.name for info in method_infos("metaballs")])
     parser.add_argument("--most-balls", type=int, default=10_000_000)
     parser.add_argument("--size", default="1920x1080", help="of the pictures, WIDTHxHEIGHT")
     parser.add_argument("--limit", type=float, default=20.0, help="seconds after which a method's greater cases are left out")

@@ -12,7 +12,7 @@ from scenes import Scene
 import meniscus
 from meniscus.addon.render.registry import method_infos
 
-METHODS = [info.name for info in method_infos()]
+METHODS = [info.name for info in method_infos("metaballs")]
 WIDTH, HEIGHT = 480, 360
 PIXELS = 1500
 

@@ -14,7 +14,7 @@ from meniscus.addon.render.depth_contrast import spatial_importance
 from meniscus.addon.render.registry import method_infos
 
 HEADLIGHT = meniscus.Look(style="headlight")
-METHODS = [info.name for info in method_infos()]
+METHODS = [info.name for info in method_infos("metaballs")]
 
 
 LARGE_SCENES = ("eye_inside_fluid", "long_lists", "random_5000", "lattice_with_droplets")

@@ -7,7 +7,7 @@ from paper_scenes import NAMES, PIXELS, compare_picture
 
 from meniscus.addon.render.registry import method_infos
 
-METHODS = [info.name for info in method_infos()]
+METHODS = [info.name for info in method_infos("metaballs")]
 RELATIVE_RMS = 1e-5
 """Of t; the paper, section 6, reports 7e-3."""
 SMALL = ("kanamori_figure_1", "kanamori_figure_2", "kanamori_figure_11")

@@ -6,10 +6,11 @@ import pytest
 import shader_lint
 
 import meniscus
+from meniscus.addon.fluid.displays import METABALLS
 from meniscus.addon.fluid.kernels import KERNELS, POLYNOMIAL_KERNELS
 from meniscus.addon.render.registry import method_infos
 
-GPU_METHODS = [info.name for info in method_infos() if info.backend == "gpu"]
+GPU_METHODS = [info for info in method_infos() if info.backend == "gpu"]
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +41,14 @@ def compiled_programs(another_context, monkeypatch):
     return compiled
 
 
-@pytest.mark.parametrize("method", GPU_METHODS)
+@pytest.mark.parametrize("method", GPU_METHODS, ids=lambda info: info.name)
 def test_lint_checks_what_the_driver_gets(method, compiled_programs, checked_programs):
     camera = meniscus.Camera.perspective((0, -4, 0), (0, 0, 0), width=8, height=8)
-    takes_any = next(info for info in method_infos() if info.name == method).any_kernel
-    kernels = KERNELS if takes_any else POLYNOMIAL_KERNELS
+    kernels = KERNELS if method.any_kernel and METABALLS in method.displays else POLYNOMIAL_KERNELS
     for kernel in kernels:
         for colors in (None, (1, 0, 0)):
-            balls = meniscus.Balls([[0, 0, 0]], 1.0, colors=colors)
-            meniscus.render(balls, camera, meniscus.Field(kernel), method=method, passes=("combined",))
-    assert len(compiled_programs) >= len(kernels)
+            for display in method.displays:
+                balls, field = meniscus.Balls([[0, 0, 0]], 1.0, colors=colors), meniscus.Field(kernel)
+                meniscus.render(balls, camera, field, method=method.name, passes=("combined",), display=display)
+    assert len(compiled_programs) >= (len(kernels) if METABALLS in method.displays else 4)
     assert [program for program in compiled_programs if program not in checked_programs] == []

@@ -22,7 +22,7 @@ from meniscus.gpu_shaders.tracing import images, stage
 from meniscus.gpu_shaders.tracing.stage import TracedFluid, TracedLight
 
 MEMORIES = pytest.mark.parametrize("with_storage", [False, True], ids=["textures", "storage"])
-GPU_METHODS = [info.name for info in method_infos() if info.backend == "gpu"]
+GPU_METHODS = [info.name for info in method_infos("metaballs") if info.backend == "gpu"]
 
 SUN = Light("SUN", (2.0, 1.9, 1.8), direction=(-0.4, 0.6, -0.6928203), radius=0.05)
 LAMPS = (

@@ -125,6 +125,10 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "attributes": lambda sizes: st.lists(
         st.tuples(array("f4", 0, 1, sizes.balls, 3), array("f4", 0, 1, sizes.height, sizes.width, 3)), max_size=2
     ),
+    "centers": lambda sizes: array("f4", -2, 2, sizes.balls, 3),
+    "extents": lambda sizes: array("f4", 0.1, 2, sizes.balls) | array("f4", -1, 1, sizes.balls, 9),
+    "names": lambda sizes: array("i4", 0, 9, sizes.balls),
+    "name": lambda sizes: array("i4", -1, 9, sizes.height, sizes.width),
     "background": lambda sizes: st.just(1e10),
     "stride": lambda sizes: st.sampled_from([4, 2, 1]),
     "vertices": lambda sizes: array("f4", -2, 2, sizes.balls, 3),

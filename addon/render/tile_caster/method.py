@@ -6,12 +6,9 @@ import platform
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from ...fluid.passes import DEPTH_BACKGROUND
 from .. import native
-from ..method import Request, Surface, timed
+from ..method import Request, Surface, timed, unfilled_surface
 
 # Every fourth pixel along both axes, then every second, then all.
 _STRIDES = (4, 2, 1)
@@ -44,7 +41,7 @@ class TileCaster:
             caster = self._caster(request)
         counts = {"balls_drawn": caster.seen, "tile_entries": caster.tile_entries}
         for stride in strides:
-            surface = _unfilled(request)
+            surface = unfilled_surface(request)
             with native.translated_errors(), timed(milliseconds, "cast"):
                 self._cast(caster, request, surface, stride)
             surface.milliseconds, surface.counts = dict(milliseconds), dict(counts)
@@ -76,20 +73,3 @@ class TileCaster:
 def create() -> TileCaster:
     """The method, ready to run; raises DeviceError where the native core is missing."""
     return TileCaster()
-
-
-def _unfilled(request: Request) -> Surface:
-    """A surface whose every pixel the native core writes."""
-    shape = (request.camera.height, request.camera.width)
-    balls, attributes, memory = request.balls, request.attributes, request.memory
-
-    def vectors(is_wanted: bool) -> npt.NDArray[np.float32] | None:
-        return memory.empty((*shape, 3), np.float32) if is_wanted else None
-
-    return Surface(
-        depth=memory.empty(shape, np.float32),
-        normal=memory.empty((*shape, 3), np.float32),
-        color=vectors("color" in attributes and balls.colors is not None),
-        velocity=vectors("velocity" in attributes and balls.velocities is not None),
-        ball=memory.empty(shape, np.int32) if "ball" in attributes else None,
-    )

@@ -4,11 +4,13 @@
 //! with an error instead of an abort. Everything else is a way to find the surface.
 
 pub mod balls;
+mod bands;
 mod cells;
 pub mod clusters;
 pub mod error;
 pub mod field;
 pub mod fitted_bvh;
+pub mod glyphs;
 pub mod job;
 pub mod kernel;
 pub mod memory;

@@ -4,6 +4,7 @@
 mod arrays;
 mod clusters;
 mod fitted_bvh;
+mod glyphs;
 mod neighbours;
 mod oracle;
 mod rasterizer;
@@ -22,6 +23,8 @@ mod meniscus_native {
     use super::clusters::find_clusters;
     #[pymodule_export]
     use super::fitted_bvh::FittedBvh;
+    #[pymodule_export]
+    use super::glyphs::cast_glyphs;
     #[pymodule_export]
     use super::neighbours::find_neighbours;
     #[pymodule_export]

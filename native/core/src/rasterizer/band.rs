@@ -1,40 +1,17 @@
 //! A band of rows of pixels: its triangles are drawn one after the other, then normals are found where one is seen.
 
-use super::bins::{Bins, Seen};
 use super::triangle::{Edges, plane_normal};
 use super::{NO_TRIANGLE, Triangles, View, dot};
+use crate::bands::{BAND, Bins, Centers, Seen};
 use crate::error::Result;
 use crate::job::Job;
-use crate::memory;
 use crate::simd::{Simd, Task};
-
-/// Rows of a band.
-pub const BAND: usize = 16;
 
 /// Columns that are tested together before their pixels are looked at.
 const SPAN: usize = 32;
 
 /// Triangles after which drawing asks whether the user gave up.
 const CHECKED: usize = 256;
-
-/// Where in the window the pixel centres of each column and row lie.
-pub struct Centers {
-    pub columns: Vec<f64>,
-    pub rows: Vec<f64>,
-}
-
-impl Centers {
-    /// Of a view's pixels.
-    ///
-    /// # Errors
-    /// `OutOfMemory`.
-    pub fn new(view: &View) -> Result<Self> {
-        let (mut columns, mut rows) = (memory::with_capacity(view.width)?, memory::with_capacity(view.height)?);
-        columns.extend((0..view.width).map(|column| view.pixel_center(column, 0)[0]));
-        rows.extend((0..view.height).map(|row| view.pixel_center(0, row)[1]));
-        Ok(Self { columns, rows })
-    }
-}
 
 /// The rows of the image that make the band.
 pub struct Rows<'a> {

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::band::Centers;
 use super::triangle::Edges;
 use super::{Triangles, View};
+use crate::bands::Centers;
 use crate::error::{Error, Result};
 use crate::job::Job;
 

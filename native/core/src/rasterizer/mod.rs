@@ -6,16 +6,15 @@
 //! or the instructions of the processor.
 
 mod band;
-mod bins;
 mod displacement;
 mod triangle;
 
 use rayon::prelude::*;
 
-use self::band::{BAND, Band, Centers, Rows};
-use self::bins::Bins;
+use self::band::{Band, Rows};
 pub use self::displacement::displace;
 use self::triangle::Corners;
+use crate::bands::{BAND, Bins, CHUNK, Centers, Place, Placed};
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::simd::Path;
@@ -23,9 +22,6 @@ pub use crate::tile_caster::View;
 
 /// What stands for no triangle.
 pub const NO_TRIANGLE: i32 = -1;
-
-/// Triangles after which work asks whether the user gave up.
-const CHUNK: usize = 4096;
 
 /// Triangles in world space.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +56,17 @@ impl<'a> Triangles<'a> {
             let offset = [0, 1, 2].map(|axis| f64::from(vertex[axis]) - view.eye[axis]);
             view.camera_from_world.map(|row| row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2])
         })
+    }
+}
+
+impl Placed for Triangles<'_> {
+    fn count(&self) -> usize {
+        self.corners.len()
+    }
+
+    #[inline(always)]
+    fn place(&self, index: usize, view: &View) -> Option<Place> {
+        triangle::place(&self.in_view(index, view), view)
     }
 }
 

@@ -1,12 +1,10 @@
 //! One triangle in camera space: x to the right, y up, planar depth.
 
 use super::{View, dot};
+use crate::bands::Place;
 
 /// Its corners.
 pub type Corners = [[f64; 3]; 3];
-
-/// Pixels by which rounding may place a corner wrongly.
-const PIXEL_MARGIN: f64 = 0.01;
 
 /// Its edge functions: for the ray of a place in the window, each corner's share of the point that it meets, but for a common
 /// factor.
@@ -62,37 +60,26 @@ pub fn plane_normal([a, b, c]: &Corners, view: &View) -> [f64; 3] {
     [0, 1, 2].map(|axis| dot(normal, [rows[0][axis], rows[1][axis], rows[2][axis]]))
 }
 
-/// The pixels that a triangle may cover: columns and rows, first and behind the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    pub columns: [u16; 2],
-    pub rows: [u16; 2],
-}
-
-impl Place {
-    /// The pixels whose rays may meet a triangle between the clip depths, if there are any.
-    #[inline(always)]
-    pub fn of(corners: &Corners, view: &View) -> Option<Self> {
-        let depths = [corners[0][2], corners[1][2], corners[2][2]];
-        let (near, far) = (least(depths), greatest(depths));
-        let is_between = far >= view.clip[0] && near <= view.clip[1] && (far > 0.0 || !view.is_perspective);
-        if !(is_between && corners.as_flattened().iter().all(|number| number.is_finite())) {
-            return None;
-        }
-        let [x, y] = if !view.is_perspective {
-            [0, 1].map(|axis| [corners[0][axis], corners[1][axis], corners[2][axis]]).map(range)
-        } else if near > 0.0 && near >= view.clip[0] {
-            [0, 1].map(|axis| [0, 1, 2].map(|corner: usize| corners[corner][axis] / depths[corner])).map(range)
-        } else if view.clip[0] > 0.0 {
-            beyond(corners, view.clip[0])
-        } else {
-            // What reaches to the eye may be seen anywhere.
-            [[view.window[0], view.window[1]], [view.window[2], view.window[3]]]
-        };
-        let size = view.pixel_size();
-        let columns = pixels(x, view.window[0], size[0], view.width)?;
-        Some(Self { columns, rows: pixels(y, view.window[2], size[1], view.height)? })
+/// The pixels whose rays may meet a triangle between the clip depths, if there are any.
+#[inline(always)]
+pub fn place(corners: &Corners, view: &View) -> Option<Place> {
+    let depths = [corners[0][2], corners[1][2], corners[2][2]];
+    let (near, far) = (least(depths), greatest(depths));
+    let is_between = far >= view.clip[0] && near <= view.clip[1] && (far > 0.0 || !view.is_perspective);
+    if !(is_between && corners.as_flattened().iter().all(|number| number.is_finite())) {
+        return None;
     }
+    let window = if !view.is_perspective {
+        [0, 1].map(|axis| [corners[0][axis], corners[1][axis], corners[2][axis]]).map(range)
+    } else if near > 0.0 && near >= view.clip[0] {
+        [0, 1].map(|axis| [0, 1, 2].map(|corner: usize| corners[corner][axis] / depths[corner])).map(range)
+    } else if view.clip[0] > 0.0 {
+        beyond(corners, view.clip[0])
+    } else {
+        // What reaches to the eye may be seen anywhere.
+        [[view.window[0], view.window[1]], [view.window[2], view.window[3]]]
+    };
+    Place::of_window(window, view)
 }
 
 /// Where in a perspective window the part of a triangle lies that is beyond a depth: least and greatest x and y.
@@ -114,14 +101,6 @@ fn beyond(corners: &Corners, start: f64) -> [[f64; 2]; 2] {
         }
     }
     ranges
-}
-
-/// Pixels whose centres lie in a range of the window: the first and the one behind the last, if there are any.
-#[inline(always)]
-fn pixels([low, high]: [f64; 2], start: f64, size: f64, count: usize) -> Option<[u16; 2]> {
-    let first = ((low - start) / size - (0.5 + PIXEL_MARGIN)).ceil().max(0.0);
-    let end = ((high - start) / size + (0.5 + PIXEL_MARGIN)).floor().min(count as f64);
-    (first < end).then_some([first as u16, end as u16])
 }
 
 #[inline(always)]
