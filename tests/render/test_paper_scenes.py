@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
+from judge import bounds_of
 from paper_scenes import NAMES, PIXELS, compare_picture
 
 from meniscus.addon.render.registry import method_infos
@@ -16,9 +19,12 @@ SMALL = ("kanamori_figure_1", "kanamori_figure_2", "kanamori_figure_11")
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in SMALL else [pytest.mark.slow]) for name in NAMES])
 @pytest.mark.parametrize("method", METHODS)
 def test_the_papers_pictures_match_the_oracle(method, name):
-    verdict = compare_picture(method, name)
+    verdict, bounds = compare_picture(method, name), bounds_of(method)
     assert verdict.compared > 0.1 * PIXELS, "the picture should show something"
-    assert not verdict.wrong, f"{len(verdict.wrong)} wrong pixels of {PIXELS}: {verdict.wrong[:5]}"
+    assert len(verdict.wrong) <= math.ceil(bounds.wrong * PIXELS), (
+        f"{len(verdict.wrong)} wrong pixels of {PIXELS}: {verdict.wrong[:5]}"
+    )
     assert verdict.undecidable <= 0.002 * PIXELS
-    assert verdict.relative_rms <= RELATIVE_RMS
-    assert verdict.worst_angle <= 0.5
+    # Where something may be missed, what is seen still lies nearer than in the paper.
+    assert verdict.relative_rms <= (bounds.rms if bounds.wrong else RELATIVE_RMS)
+    assert verdict.tilted <= bounds.tilted * PIXELS, f"{verdict.tilted} normals are off, by up to {verdict.worst_angle} degrees"
