@@ -28,6 +28,6 @@ void main() {
         out_samples = walk.first + walk.spacing * vec4(0.0, 1.0, 2.0, 3.0);
     }
     gl_FragDepth = samples_depth(out_samples);
-    if (walk_goes_on(walk))
-        gl_FragDepth = min(walk_horizon(walk, out_samples.w) * depth_scale, ANY_DISTANCE);
+    if (samples_asked(out_samples))
+        gl_FragDepth = min(walk_horizon(walk, samples_farthest(out_samples)) * depth_scale, ANY_DISTANCE);
 }

@@ -19,14 +19,17 @@ struct Walk {
     bool looks_far; // no ball reaches t: how far is the next one?
 };
 
+const float HAS_STOPPED = -1.0;
+
 // So many steps beyond the last sample all balls are known that begin there, without looking far.
 const float VIEW = 8.0;
 
-float walk_horizon(Walk walk, float last) {
-    return walk.looks_far ? NOTHING : last + VIEW * walk.spacing;
+// How far balls are asked for.
+float walk_horizon(Walk walk, float last_sample) {
+    if (walk.first < 0.0)
+        return last_sample; // the bracket is narrowed
+    return walk.looks_far ? NOTHING : last_sample + VIEW * walk.spacing;
 }
-
-const float HAS_STOPPED = -1.0;
 
 Walk walk_unpack(vec4 place, vec2 pace) {
     return Walk(place.x, place.y, place.z, place.w, pace.x, pace.y > 0.0);
