@@ -17,11 +17,15 @@ from project import ROOT, ToolError, command_line
 BLENDER = frozenset({"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "bmesh", "imbuf", "idprop", "aud", "bgl"})
 OPENGL = frozenset({"moderngl", "glcontext"})
 
-# What the native core makes for shaders to read.
-TREES = ("addon/render/fitted_bvh", "addon/render/tree_builder")
-
-# What methods on both back-ends show in the place of balls.
-GLYPHS = "addon/render/glyphs"
+# What a method is, and what the native core makes for shaders to read.
+FOR_METHODS = (
+    "addon/render/method",
+    "addon/render/settings",
+    "addon/render/fitted_bvh",
+    "addon/render/tree_builder",
+    "addon/render/neighbours",
+    "addon/render/glyphs",
+)
 
 
 @dataclass(frozen=True)
@@ -42,11 +46,7 @@ AREAS = (
     Area("addon/output", ("addon/fluid", "addon/output"), frozenset({"numpy", "OpenEXR"})),
     Area("addon/render", ("addon/fluid", "addon/render", "gpu_shaders"), frozenset({"numpy", "meniscus_native"})),
     Area("addon/blender", ("addon", "gpu_shaders"), BLENDER | {"numpy"}),
-    Area(
-        "gpu_shaders",
-        ("addon/fluid", *TREES, GLYPHS, "addon/render/method", "addon/render/neighbours", "addon/render/settings", "gpu_shaders"),
-        OPENGL | {"numpy"},
-    ),
+    Area("gpu_shaders", ("addon/fluid", *FOR_METHODS, "gpu_shaders"), OPENGL | {"numpy"}),
     Area("samples", ("addon", "gpu_shaders", "samples", ""), None),
 )
 

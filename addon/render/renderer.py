@@ -109,7 +109,8 @@ def render(
     InputError, DeviceError, CancelledError
         Each with one sentence for the user.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings, display)
+    told = is_cancelled, on_progress
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, *told, threads, settings, display)
     request = shot.request if memory is None else replace(shot.request, memory=memory)
     shot = replace(shot, request=request, backdrop=backdrop, motion=motion, sample=sample)
     return shot.image(shot.choice.runner.find_surface(shot.request))
@@ -138,7 +139,8 @@ def render_progressively(
     ImageBuffers of the whole image, each finer than the one before; the last is what :func:`render` returns. A method that
     cannot do so yields that one only.
     """
-    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, on_progress, threads, settings, display)
+    told = is_cancelled, on_progress
+    shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, *told, threads, settings, display)
     runner = shot.choice.runner
     if isinstance(runner, ProgressiveMethod):
         yield from map(shot.image, runner.find_surfaces(shot.request))

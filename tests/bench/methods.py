@@ -59,8 +59,10 @@ def methods_table(methods: list[MethodInfo], plan: Plan) -> str:
     rows = []
     for info in methods:
         wrong, rms, worst = errors(info)
-        ratio = report.ratio(medians[info.name], fastest)
-        rows.append([info.label, info.backend, f"{wrong:.3%}", f"{rms:.1e}", f"{worst:.1e}", report.milliseconds(medians[info.name].median), ratio])
+        median = medians[info.name]
+        times_the_fastest = report.ratio(median, fastest)
+        numbers = [f"{wrong:.3%}", f"{rms:.1e}", f"{worst:.1e}", report.milliseconds(median.median), times_the_fastest]
+        rows.append([info.label, info.backend, *numbers])
         print(rows[-1], flush=True)
     return report.table(["method", "back-end", "wrong pixels", "RMS dt / R", "worst dt / R", "ms", "times the fastest"], rows)
 
@@ -81,8 +83,8 @@ def drawing(info: MethodInfo, size: tuple[int, int]) -> Callable[[], meniscus.Im
 
 
 def errors(info: MethodInfo) -> tuple[float, float, float]:
-    """Against the oracle: the share of pixels, of those that show fluid or should, that are off by more than 0.02 R or differ in
-    whether there is fluid; RMS and greatest |dt| / R of the others.
+    """Against the oracle: of the pixels that show fluid or should, the share of those that are off by more than 0.02 R or show
+    the wrong one of fluid and nothing; RMS and greatest |dt| / R of the rest.
     """
     scene = SCENES[SCENE]
     balls = scene.make_balls()
