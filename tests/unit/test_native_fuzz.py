@@ -186,6 +186,7 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "number": lambda sizes: st.integers(0, 2**32 - 1),
     "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
     "behind": lambda sizes: st.none() | st.tuples(*[st.floats(width=32)] * 4),
+    "most": lambda sizes: st.integers(0, 2**32 - 1),
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
