@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 import meniscus
+from meniscus.addon.fluid.displays import METABALLS
 from meniscus.addon.render.method import MethodInfo
 
 from . import machine, report
@@ -40,11 +41,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pictures", action="store_true", help="render the pictures of docs/methods.md instead")
     parser.add_argument("--update-docs", action="store_true", help="also put the table into docs/methods.md")
     options = parser.parse_args(arguments)
-    methods = [status.info for status in meniscus.methods() if not status.problem and "metaballs" in status.info.displays]
+    runnable = [status.info for status in meniscus.methods() if not status.problem]
     if options.pictures:
-        for info in methods:
+        for info in runnable:
             save_picture(info)
         return
+    methods = [info for info in runnable if METABALLS in info.displays]
     about = machine.describe()
     print(about["warning"], flush=True)
     text = "\n\n".join([report.machine_text(about), methods_table(methods, Plan(options.repeats))])
@@ -102,12 +104,13 @@ def errors(info: MethodInfo) -> tuple[float, float, float]:
 
 
 def save_picture(info: MethodInfo) -> None:
-    """Render the scene with a method into docs/images."""
+    """Render the scene with a method into docs/images: as metaballs, or as spheres where it has no others."""
     scene = SCENES[SCENE]
     balls = scene.make_balls()
     width, height = PICTURE_SIZE
     camera = scene.camera(balls, FINER * width, FINER * height)
-    image = meniscus.render(balls, camera, scene.field, method=info.name, passes=("combined",), look=LOOK)
+    display = METABALLS if METABALLS in info.displays else "spheres"
+    image = meniscus.render(balls, camera, scene.field, method=info.name, passes=("combined",), look=LOOK, display=display)
     combined = image["combined"][::-1]
     linear = combined[..., :3] + (1 - combined[..., 3:]) * BACKGROUND
     linear = np.clip(linear, 0, 1).reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
