@@ -19,6 +19,7 @@ from meniscus.addon.fluid.errors import MeniscusError
 from meniscus.addon.fluid.kernels import POLYNOMIAL_KERNELS
 from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method, gpu, method_infos
+from meniscus.addon.render.settings import checked_settings
 
 from . import machine, report
 from .scenes import CROSSINGS, dense_balls, three_quarter_camera
@@ -142,7 +143,8 @@ def find(case: Case, balls: meniscus.Balls, method: str) -> tuple[float, dict[st
     info, runner = create_method(method)
     camera = three_quarter_camera(balls, *case.size)
     field = meniscus.Field(case.kernel, case.isovalue)
-    request = Request(balls, camera, field, frozenset(), 0, lambda share: None)
+    settings = checked_settings(method, info.settings, None)
+    request = Request(balls, camera, field, frozenset(), 0, lambda share: None, settings=settings)
     start = time.perf_counter()
     surface = runner.find_surface_on_device(request) if info.backend == "gpu" else runner.find_surface(request)
     spent = 1e3 * (time.perf_counter() - start)
