@@ -16,8 +16,14 @@ RELATIVE_RMS = 1e-5
 SMALL = ("kanamori_figure_1", "kanamori_figure_2", "kanamori_figure_11")
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in SMALL else [pytest.mark.slow]) for name in NAMES])
-@pytest.mark.parametrize("method", METHODS)
+def cases():
+    """Methods that sample take too long for the large scenes."""
+    for method in METHODS:
+        for name in SMALL if bounds_of(method).wrong else NAMES:
+            yield pytest.param(method, name, marks=[] if name in SMALL else [pytest.mark.slow])
+
+
+@pytest.mark.parametrize(("method", "name"), cases())
 def test_the_papers_pictures_match_the_oracle(method, name):
     verdict, bounds = compare_picture(method, name), bounds_of(method)
     assert verdict.compared > 0.1 * PIXELS, "the picture should show something"
