@@ -186,7 +186,7 @@ def test_the_panel_shows_the_settings_of_the_chosen_method_alone(meniscus, scene
     panels._draw_surface(Layout(), scene.meniscus)
     scene.meniscus.method = "auto"
     panels._draw_surface(Layout(), scene.meniscus)
-    plain = ["kernel", "isovalue", "method"]
+    plain = ["display", "kernel", "isovalue", "method"]
     assert shown == [*plain, "width", "count", "use_bisection", "budget", "backend", *plain, "backend"]
 
 
