@@ -23,7 +23,7 @@ def cases():
             yield pytest.param(method, name, marks=[] if name in SMALL else [pytest.mark.slow])
 
 
-@pytest.mark.parametrize(("method", "name"), cases())
+@pytest.mark.parametrize(("method", "name"), list(cases()))
 def test_the_papers_pictures_match_the_oracle(method, name):
     verdict, bounds = compare_picture(method, name), bounds_of(method)
     assert verdict.compared > 0.1 * PIXELS, "the picture should show something"

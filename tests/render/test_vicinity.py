@@ -13,7 +13,9 @@ from test_random_views import random_scene
 
 import meniscus
 from meniscus.addon.fluid.errors import InputError
+from meniscus.addon.render.method import Request
 from meniscus.addon.render.registry import create_method
+from meniscus.addon.render.settings import checked_settings
 from meniscus.gpu_shaders.methods.vicinity import method as vicinity
 
 # Rims, coincident balls, crossings of many spheres, starts inside, the far clip plane, digits, sizes, carving, creases.
@@ -188,10 +190,9 @@ def test_attributes_and_parts_of_an_image(monkeypatch, exact):
 def test_the_surface_on_the_device_is_the_same():
     scene = SCENES["ten_balls"]()
     camera = scene.camera("perspective")
-    _, method = create_method("vicinity")
-    from meniscus.addon.render.renderer import _Shot
-
-    shot = _Shot.prepare(scene.balls, camera, scene.field, "vicinity", "auto", ("depth",), None, None, None, 0, None)
-    textures = method.find_surface_on_device(shot.request)
-    np.testing.assert_array_equal(textures.read_back()["depth"], method.find_surface(shot.request).depth)
+    info, method = create_method("vicinity")
+    settings = checked_settings(info.name, info.settings, None)
+    request = Request(scene.balls, camera, scene.field, frozenset(), 0, lambda _: None, settings=settings)
+    textures = method.find_surface_on_device(request)
+    np.testing.assert_array_equal(textures.read_back()["depth"], method.find_surface(request).depth)
     textures.release()
