@@ -198,10 +198,14 @@ def under_xvfb(folder: str) -> list[str]:
     """What starts a program with a screen that nobody sees.
 
     Its pixels are in a file, whose path is in MENISCUS_SCREEN. MENISCUS_PICTURES is a folder for pictures that tests make.
+    Each start has a folder for its screen: a server that still goes down would take the file of the next one with it.
     """
-    variables = [f"MENISCUS_SCREEN={folder}/screen/Xvfb_screen0", f"MENISCUS_PICTURES={folder}/pictures"]
-    screen = f"--server-args=-screen 0 1280x800x24 -nocursor -fbdir {folder}/screen"
-    return [*variables, "xvfb-run", "--auto-servernum", screen]
+    start = f"""
+        screen=$(mktemp --directory {folder}/screen/XXXXXX)
+        export MENISCUS_SCREEN=$screen/Xvfb_screen0 MENISCUS_PICTURES={folder}/pictures
+        exec xvfb-run --auto-servernum "--server-args=-screen 0 1280x800x24 -nocursor -fbdir $screen" "$@"
+    """
+    return ["sh", "-c", start, "sh"]
 
 
 def fill(folder: Path) -> None:
