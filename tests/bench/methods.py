@@ -13,6 +13,7 @@ from PIL import Image
 import meniscus
 from meniscus.addon.fluid.displays import METABALLS
 from meniscus.addon.render.method import MethodInfo
+from meniscus.addon.render.registry import create_method
 
 from . import machine, report
 from .accuracy import FloatArray, field_hits, pixel_grid, pixel_rays
@@ -47,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
             save_picture(info)
         return
     methods = [info for info in runnable if METABALLS in info.displays]
-    about = machine.describe()
+    about = machine.describe() | {"gl_renderer": create_method("glyphs")[1].device}
     print(about["warning"], flush=True)
     text = "\n\n".join([report.machine_text(about), methods_table(methods, Plan(options.repeats))])
     report.publish(NAME, {"machine": about, "text": text}, text, options.update_docs, PAGE)
