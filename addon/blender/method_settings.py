@@ -34,7 +34,10 @@ def unregister() -> None:
     """Take them away; a .blend file keeps its values."""
     del MENISCUS_PG_scene.method_settings
     while _groups:
-        bpy.utils.unregister_class(_groups.pop())
+        group = _groups.pop()
+        bpy.utils.unregister_class(group)
+        # The bpy wheels 4.2 and 4.5 crash where a property with a callback is alive when Python ends.
+        group.__annotations__.clear()
 
 
 def group_of(settings: bpy.types.PropertyGroup, method: str) -> bpy.types.PropertyGroup | None:
