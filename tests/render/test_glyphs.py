@@ -168,7 +168,7 @@ def test_parts_of_an_image_give_the_same(monkeypatch, display):
     scene = SCENES["ten_balls"]()
     camera = scene.camera("perspective")
     whole = picture(scene, camera, display, "glyphs")
-    monkeypatch.setattr(method, "_PIXELS_A_PART", 14 * camera.width)
+    monkeypatch.setattr(method.GlyphsMethod, "pixels_a_part", 14 * camera.width)
     in_parts = picture(scene, camera, display, "glyphs")
     np.testing.assert_array_equal(in_parts["ball_id"], whole["ball_id"])
     np.testing.assert_allclose(in_parts["depth"], whole["depth"], rtol=1e-6)

@@ -178,7 +178,7 @@ def test_attributes_and_parts_of_an_image(monkeypatch, exact):
         "look": meniscus.Look(style="flat"),
     }
     whole = meniscus.render(balls, camera, method="vicinity", settings={"exact": exact}, **request)
-    monkeypatch.setattr(vicinity, "_PIXELS_A_PART", 14 * camera.width)
+    monkeypatch.setattr(vicinity.Vicinity, "pixels_a_part", 14 * camera.width)
     parts = meniscus.render(balls, camera, method="vicinity", settings={"exact": exact}, **request)
     reference = meniscus.render(balls, camera, method="tile_caster", **request)
     np.testing.assert_array_equal(parts.hit, whole.hit)

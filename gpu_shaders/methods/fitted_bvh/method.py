@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
-from typing import TypeVar
-
 from ....addon.fluid.balls import Balls
-from ....addon.fluid.camera import Camera, Region
-from ....addon.fluid.errors import MeniscusError
+from ....addon.fluid.camera import Camera
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import POLYNOMIAL_KERNELS
-from ....addon.render.method import Attribute, Request, Surface, timed
+from ....addon.render.method import Attribute, Request
 from ....addon.render.tree_builder import TREES, BuiltTree, TreeBuilder
-from ...camera_parts import image_parts
 from ...compute_step import ComputeStep
 from ...context import GpuContext, shared_context
+from ...parted_method import PartedMethod
 from ...stage_times import StageTimes
 from ...step import Step
 from ...surface_textures import SurfaceTextures
@@ -26,14 +20,11 @@ from ...tree_constants import TreeVariant
 from .params import METHOD
 from .programs import Variant
 
-Result = TypeVar("Result")
-
-_PIXELS_A_PART = 1 << 23
 _IMAGES = {"depth": 0, "normal": 1, "color": 2, "velocity": 3, "ball": 4}
 """Binding points."""
 
 
-class FittedBvhMethod:
+class FittedBvhMethod(PartedMethod[BuiltTree]):
     """The method on one OpenGL context.
 
     Parameters
@@ -48,7 +39,7 @@ class FittedBvhMethod:
 
     def __init__(self, context: GpuContext, hierarchy: str = "fitted", with_storage: bool | None = None) -> None:
         context.require(METHOD.gl_version, draw_buffers=len(_IMAGES))
-        self._context = context
+        super().__init__(context, METHOD)
         self._hierarchy = hierarchy
         self._with_storage = uses_storage(context) if with_storage is None else with_storage
         self._steps: dict[Variant, Step | ComputeStep] = {}
@@ -58,53 +49,19 @@ class FittedBvhMethod:
         # A driver that rejects the shaders is to be known before the method is chosen.
         context.run(lambda: self._step_of(Variant(POLYNOMIAL_KERNELS["wyvill"], TreeVariant(self._with_storage))))
 
-    @property
-    def device(self) -> str:
-        """What the driver calls the graphics processor."""
-        return str(self._context.renderer)
-
-    @property
-    def shares_textures(self) -> bool:
-        """See :meth:`method.DeviceMethod.shares_textures`."""
-        return self._context.shares
-
     def prepare(self, balls: Balls, field: Field, threads: int) -> None:
         """See :meth:`method.PreparingMethod.prepare`."""
         if len(balls):
             self._builder.expect(balls, field, threads)
 
-    def find_surface(self, request: Request) -> Surface:
-        """See :meth:`method.Method.find_surface`."""
-        surface = Surface.background(request.camera, request.known_attributes)
-        if len(request.balls):
-            tree = self._tree_of(request, surface.milliseconds)
-            with timed(surface.milliseconds, "surface"):
-                limits = self._context.limits
-                longest = min(limits.texture_size, limits.viewport_size)
-                for region in image_parts(request.camera, _PIXELS_A_PART, longest):
-                    request.watch(region.y_min / request.camera.height)
-                    self._run(partial(self._find_part, request, tree, region, surface))
-        return surface
+    def scene_of(self, request: Request, milliseconds: dict[str, float]) -> BuiltTree | None:
+        """The tree over the balls."""
+        return self._tree_of(request, milliseconds) if len(request.balls) else None
 
-    def find_surface_on_device(self, request: Request) -> SurfaceTextures:
-        """See :meth:`method.DeviceMethod.find_surface_on_device`."""
-        camera = request.camera
-        milliseconds: dict[str, float] = {}
-        self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
-        tree = self._tree_of(request, milliseconds) if len(request.balls) else None
-        with timed(milliseconds, "surface"):
-            textures = self._run(lambda: self._find_on_device(request, tree))
-        textures.milliseconds |= milliseconds
-        return textures
-
-    def _run(self, work: Callable[[], Result]) -> Result:
-        """Do `work` on the context's thread; after an error nothing is kept, as the driver may have refused the memory."""
-        try:
-            return self._context.run(work)
-        except MeniscusError:
-            self._tree, self._buffers = None, None
-            self._builder.forget()
-            raise
+    def forget(self) -> None:
+        """See :meth:`PartedMethod.forget`."""
+        self._tree, self._buffers = None, None
+        self._builder.forget()
 
     def _tree_of(self, request: Request, milliseconds: dict[str, float]) -> BuiltTree:
         """The tree over the balls, which stays while the same balls are asked for; the time that it took where it is new."""
@@ -114,32 +71,13 @@ class FittedBvhMethod:
             self._tree, self._buffers = tree, None
         return tree
 
-    def _find_part(self, request: Request, tree: BuiltTree, region: Region, surface: Surface) -> None:
-        """Fill a part of `surface`; on the context's thread."""
-        camera = replace(request.camera, region=region).cropped()
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
-        self._find(request, tree, camera, textures)
-        textures.read_into(surface, region)
-
-    def _find_on_device(self, request: Request, tree: BuiltTree | None) -> SurfaceTextures:
-        """On the context's thread."""
-        camera = request.camera
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
-        if tree is None:
-            textures.clear()
-        else:
-            self._find(request, tree, camera, textures)
-        # Another context sees what is finished; it could not wait for what is not.
-        self._context.gl.finish()
-        return textures
-
-    def _find(self, request: Request, tree: BuiltTree, camera: Camera, textures: SurfaceTextures) -> None:
-        """Fill the textures."""
+    def fill(self, request: Request, scene: BuiltTree, camera: Camera, textures: SurfaceTextures) -> None:
+        """See :meth:`PartedMethod.fill`."""
         times = StageTimes(self._context)
         with times.of("upload"):
-            buffers = self._uploaded(tree, frozenset(request.known_attributes))
+            buffers = self._uploaded(scene, frozenset(request.known_attributes))
         step = self._step_of(Variant(request.field.polynomial_kernel, buffers.variant, request.known_attributes))
-        step.set_uniforms({**buffers.uniforms, **tree_camera_uniforms(tree.arrays, camera, request.field)})
+        step.set_uniforms({**buffers.uniforms, **tree_camera_uniforms(scene.arrays, camera, request.field)})
         with times.of("cast"):
             _cast(step, buffers, textures)
         textures.add_report(times.milliseconds, {})

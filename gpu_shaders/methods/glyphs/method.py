@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import partial
+from collections.abc import Mapping
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from ....addon.fluid.camera import Camera, Region
+from ....addon.fluid.camera import Camera
 from ....addon.fluid.errors import InputError
 from ....addon.render.glyphs import Glyphs, ViewGlyphs, glyphs_of, in_view
-from ....addon.render.method import Attribute, Request, Surface, timed
-from ...camera_parts import camera_uniforms, image_parts
+from ....addon.render.method import Attribute, Request, timed
+from ...camera_parts import camera_uniforms
 from ...context import GpuContext, shared_context
+from ...parted_method import PartedMethod
 from ...programs import ROW_TEXTURE_WIDTH
 from ...row_texture import row_texture
 from ...step import Step
@@ -23,54 +23,18 @@ from ...surface_textures import SurfaceTextures
 from .params import METHOD
 from .programs import Variant
 
-_PIXELS_A_PART = 2**23
 
-
-class GlyphsMethod:
+class GlyphsMethod(PartedMethod[ViewGlyphs]):
     """The method on one OpenGL context."""
 
     def __init__(self, context: GpuContext) -> None:
         # Depth, normal and the attributes; glyphs fill a square texture at most.
         context.require(METHOD.gl_version, 2 + len(METHOD.attributes), ROW_TEXTURE_WIDTH)
-        self._context = context
+        super().__init__(context, METHOD)
         # A driver that rejects the shaders is to be known before the method is chosen.
         context.run(lambda: [Step(context, Variant(are_spheres).nearest()) for are_spheres in (False, True)])
 
-    @property
-    def device(self) -> str:
-        """What the driver calls the graphics processor."""
-        return str(self._context.renderer)
-
-    @property
-    def shares_textures(self) -> bool:
-        """See :meth:`method.DeviceMethod.shares_textures`."""
-        return self._context.shares
-
-    def find_surface(self, request: Request) -> Surface:
-        """See :meth:`method.Method.find_surface`."""
-        surface = Surface.background(request.camera, request.known_attributes)
-        seen = self._seen(request, surface.milliseconds)
-        surface.counts = _counts(seen)
-        if len(seen):
-            limits = self._context.limits
-            with timed(surface.milliseconds, "surface"):
-                for region in image_parts(request.camera, _PIXELS_A_PART, min(limits.texture_size, limits.viewport_size)):
-                    request.watch(region.y_min / request.camera.height)
-                    self._context.run(partial(self._draw_and_read, seen, request, region, surface))
-        return surface
-
-    def find_surface_on_device(self, request: Request) -> SurfaceTextures:
-        """See :meth:`method.DeviceMethod.find_surface_on_device`."""
-        camera = request.camera
-        self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
-        milliseconds: dict[str, float] = {}
-        seen = self._seen(request, milliseconds)
-        with timed(milliseconds, "surface"):
-            textures = self._context.run(lambda: self._draw_on_device(seen, request))
-        textures.add_report(milliseconds, _counts(seen))
-        return textures
-
-    def _seen(self, request: Request, milliseconds: dict[str, float]) -> ViewGlyphs:
+    def scene_of(self, request: Request, milliseconds: dict[str, float]) -> ViewGlyphs:
         """The glyphs in the view; InputError where they are too many."""
         with timed(milliseconds, "glyphs"):
             seen = in_view(glyphs_of(request), request.camera)
@@ -79,27 +43,17 @@ class GlyphsMethod:
             raise InputError(f"{len(seen)} glyphs meet the view but {METHOD.label} takes at most {most} here; show fewer")
         return seen
 
-    def _draw_on_device(self, seen: ViewGlyphs, request: Request) -> SurfaceTextures:
-        """On the context's thread."""
-        camera = request.camera
-        textures = self._draw_part(seen, request, Region(0, 0, camera.width, camera.height))
-        # Another context sees what is finished; it could not wait for what is not.
-        self._context.gl.finish()
-        return textures
+    def counts_of(self, scene: ViewGlyphs) -> Mapping[str, int]:
+        """See :meth:`PartedMethod.counts_of`."""
+        glyphs = scene.glyphs
+        return {"glyphs": len(glyphs), "glyphs_drawn": len(scene), "balls_without_surface": glyphs.without_surface}
 
-    def _draw_and_read(self, seen: ViewGlyphs, request: Request, region: Region, surface: Surface) -> None:
-        """Fill a region of `surface`; on the context's thread."""
-        self._draw_part(seen, request, region).read_into(surface, region)
-
-    def _draw_part(self, seen: ViewGlyphs, request: Request, region: Region) -> SurfaceTextures:
-        """Draw a region of the image; on the context's thread."""
-        camera = replace(request.camera, region=region).cropped()
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
-        if len(seen):
-            _Drawing(self._context, seen, request.known_attributes).draw(camera, textures)
+    def fill(self, request: Request, scene: ViewGlyphs, camera: Camera, textures: SurfaceTextures) -> None:
+        """See :meth:`PartedMethod.fill`."""
+        if len(scene):
+            _Drawing(self._context, scene, request.known_attributes).draw(camera, textures)
         else:
             textures.clear()
-        return textures
 
 
 class _Drawing:
@@ -161,11 +115,6 @@ def _depth_scale(seen: ViewGlyphs) -> float:
     """A power of two, so that scaling loses nothing, which brings all planar depths below 1."""
     farthest = float(np.max(seen.glyphs.reaches[seen.chosen] - seen.centers[:, 2]))
     return 2.0 ** -(math.ceil(math.log2(farthest)) + 1)
-
-
-def _counts(seen: ViewGlyphs) -> dict[str, int]:
-    glyphs = seen.glyphs
-    return {"glyphs": len(glyphs), "glyphs_drawn": len(seen), "balls_without_surface": glyphs.without_surface}
 
 
 def create() -> GlyphsMethod:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import partial
-from typing import TypeVar
+from collections.abc import Mapping
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
 from ....addon.fluid.balls import Balls
-from ....addon.fluid.camera import Camera, Region
-from ....addon.fluid.errors import InputError, MeniscusError
+from ....addon.fluid.camera import Camera
+from ....addon.fluid.errors import InputError
 from ....addon.fluid.kernels import KERNELS, PolynomialKernel
-from ....addon.render.method import Request, Surface, timed
+from ....addon.render.method import Request, timed
 from ....addon.render.neighbours import MOST_NEIGHBOURS, Neighbours, find_neighbours
-from ...camera_parts import image_parts
 from ...context import GpuContext, shared_context
+from ...parted_method import PartedMethod
 from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
 from ...stage_times import StageTimes
 from ...step import Step, Texture
@@ -28,20 +25,19 @@ from .balls import BallTextures
 from .params import BISECTIONS, EXACT, METHOD, SAMPLES
 from .programs import Variant
 
-Result = TypeVar("Result")
-
-_PIXELS_A_PART = 1 << 22
 _CORNERS = 6
 """Vertices of a ball's rectangle."""
 
 
-class Vicinity:
+class Vicinity(PartedMethod[Neighbours]):
     """The method on one OpenGL context."""
+
+    pixels_a_part = 2**22
 
     def __init__(self, context: GpuContext) -> None:
         # Depth, normal, three attributes and the barrier.
         context.require(METHOD.gl_version, draw_buffers=6)
-        self._context = context
+        super().__init__(context, METHOD)
         self._steps: dict[Variant, dict[str, Step]] = {}
         self._lists: tuple[Balls, Neighbours] | None = None
         self._balls: BallTextures | None = None
@@ -49,52 +45,18 @@ class Vicinity:
         # A driver that rejects the shaders is to be known before the method is chosen.
         context.run(lambda: self._steps_of(Variant(KERNELS["wyvill"])))
 
-    @property
-    def device(self) -> str:
-        """What the driver calls the graphics processor."""
-        return str(self._context.renderer)
-
-    @property
-    def shares_textures(self) -> bool:
-        """See :meth:`method.DeviceMethod.shares_textures`."""
-        return self._context.shares
-
-    def find_surface(self, request: Request) -> Surface:
-        """See :meth:`method.Method.find_surface`."""
+    def scene_of(self, request: Request, milliseconds: dict[str, float]) -> Neighbours | None:
+        """The neighbours of the balls; InputError where what is asked for does not go together, or lists are too long."""
         _check(request)
-        surface = Surface.background(request.camera, request.known_attributes)
-        if len(request.balls):
-            lists = self._lists_of(request, surface.milliseconds)
-            with timed(surface.milliseconds, "surface"):
-                limits = self._context.limits
-                longest = min(limits.texture_size, limits.viewport_size)
-                for region in image_parts(request.camera, _PIXELS_A_PART, longest):
-                    request.watch(region.y_min / request.camera.height)
-                    self._run(partial(self._find_part, request, lists, region, surface))
-            surface.counts |= self._counts(lists)
-        return surface
+        return self._lists_of(request, milliseconds) if len(request.balls) else None
 
-    def find_surface_on_device(self, request: Request) -> SurfaceTextures:
-        """See :meth:`method.DeviceMethod.find_surface_on_device`."""
-        _check(request)
-        camera = request.camera
-        milliseconds: dict[str, float] = {}
-        self._context.require(METHOD.gl_version, texture_size=max(camera.width, camera.height))
-        lists = self._lists_of(request, milliseconds) if len(request.balls) else None
-        with timed(milliseconds, "surface"):
-            textures = self._run(lambda: self._find_on_device(request, lists))
-        textures.milliseconds |= milliseconds
-        if lists is not None:
-            textures.counts |= self._counts(lists)
-        return textures
+    def counts_of(self, scene: Neighbours) -> Mapping[str, int]:
+        """See :meth:`PartedMethod.counts_of`."""
+        return {"neighbours": len(scene.places), "lone_balls": int(np.count_nonzero(scene.counts == 0))}
 
-    def _run(self, work: Callable[[], Result]) -> Result:
-        """Do `work` on the context's thread; after an error nothing is kept, as the driver may have refused the memory."""
-        try:
-            return self._context.run(work)
-        except MeniscusError:
-            self._balls, self._targets = None, None
-            raise
+    def forget(self) -> None:
+        """See :meth:`PartedMethod.forget`."""
+        self._balls, self._targets = None, None
 
     def _lists_of(self, request: Request, milliseconds: dict[str, float]) -> Neighbours:
         """The neighbours of the balls, which stay while the same balls are asked for; the time that new ones took."""
@@ -106,35 +68,13 @@ class Vicinity:
             self._lists = request.balls, found
         return self._lists[1]
 
-    def _counts(self, lists: Neighbours) -> dict[str, int]:
-        return {"neighbours": len(lists.places), "lone_balls": int(np.count_nonzero(lists.counts == 0))}
-
-    def _find_part(self, request: Request, lists: Neighbours, region: Region, surface: Surface) -> None:
-        """Fill a part of `surface`; on the context's thread."""
-        camera = replace(request.camera, region=region).cropped()
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
-        self._find(request, lists, camera, textures)
-        textures.read_into(surface, region)
-
-    def _find_on_device(self, request: Request, lists: Neighbours | None) -> SurfaceTextures:
-        """On the context's thread."""
-        camera = request.camera
-        textures = SurfaceTextures(self._context, (camera.width, camera.height), request.known_attributes)
-        if lists is None:
-            textures.clear()
-        else:
-            self._find(request, lists, camera, textures)
-        # Another context sees what is finished; it could not wait for what is not.
-        self._context.gl.finish()
-        return textures
-
-    def _find(self, request: Request, lists: Neighbours, camera: Camera, textures: SurfaceTextures) -> None:
-        """Fill the textures."""
+    def fill(self, request: Request, scene: Neighbours, camera: Camera, textures: SurfaceTextures) -> None:
+        """See :meth:`PartedMethod.fill`."""
         times = StageTimes(self._context)
         with times.of("upload"):
-            balls = self._uploaded(request, lists)
+            balls = self._uploaded(request, scene)
         with times.of("cast"):
-            self._draw(request, balls, lists, camera, textures)
+            self._draw(request, balls, scene, camera, textures)
         textures.add_report(times.milliseconds, {})
 
     def _uploaded(self, request: Request, lists: Neighbours) -> BallTextures:
