@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -17,7 +16,7 @@ from meniscus.addon.fluid.tracing import Tracing
 
 from . import machine, report
 from .gourmel_scenes import EFFECTS, FIELD, PAPER_EFFECTS, SCENES, Scene
-from .timing import Plan, Sample, interleave, statistics_by_stage
+from .timing import Plan, repeated
 
 NAME = "gourmel-2010"
 PAGE = report.ROOT / "docs" / "gourmel_2010.md"
@@ -56,8 +55,8 @@ def scene_table(names: list[str], plan: Plan) -> str:
     for name in names:
         scene = SCENES[name]
         balls = scene.balls()
-        build = median(partial(meniscus.FittedBvh, balls, FIELD), plan)
-        frames = 1e3 / median(shot(scene, balls, scene.tracing), plan)
+        build = repeated(partial(meniscus.FittedBvh, balls, FIELD), plan).median
+        frames = 1e3 / repeated(shot(scene, balls, scene.tracing), plan).median
         paper_bvh, paper = scene.paper
         numbers = [f"{paper_bvh:g}", f"{paper:g}", f"{build:.1f}", f"{frames:.1f}", f"{frames / paper:.1f}"]
         rows.append([scene.label, f"{len(balls):,}", *numbers])
@@ -73,7 +72,7 @@ def effect_table(names: list[str], plan: Plan) -> str:
         scene = SCENES[name]
         balls = scene.balls()
         for (effect, tracing), paper in zip(EFFECTS.items(), PAPER_EFFECTS[name], strict=True):
-            frames = 1e3 / median(shot(scene, balls, tracing), plan)
+            frames = 1e3 / repeated(shot(scene, balls, tracing), plan).median
             rows.append([scene.label.partition(",")[0], effect, f"{paper:g}", f"{frames:.1f}", f"{frames / paper:.1f}"])
             print(rows[-1], flush=True)
     return report.table(["scene", "effects", "paper", "ours", "times the paper's"], rows)
@@ -85,17 +84,6 @@ def shot(scene: Scene, balls: meniscus.Balls, tracing: Tracing | None) -> Callab
     look = replace(scene.look, tracing=tracing)
     surroundings = scene.surroundings(camera)
     return lambda: meniscus.render(balls, camera, FIELD, method=METHOD, passes=("combined",), look=look, backdrop=surroundings)
-
-
-def median(action: Callable[[], object], plan: Plan) -> float:
-    """Of several runs, milliseconds."""
-
-    def run() -> Sample:
-        start = time.perf_counter()
-        action()
-        return {"whole": 1e3 * (time.perf_counter() - start)}
-
-    return statistics_by_stage(interleave({"": run}, plan)[""])["whole"].median
 
 
 def save_picture(name: str) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from PIL import Image
@@ -18,7 +16,7 @@ from meniscus.addon.render.registry import create_method
 from . import machine, report
 from .accuracy import FloatArray, field_hits, pixel_grid, pixel_rays
 from .scenes import SCENES
-from .timing import Plan, Sample, Statistics, interleave, statistics_by_stage
+from .timing import ALL, Plan, Statistics, interleave, statistics_by_stage, timed
 
 NAME = "methods"
 PAGE = report.ROOT / "docs" / "methods.md"
@@ -56,8 +54,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 def methods_table(methods: list[MethodInfo], plan: Plan) -> str:
     """What each method gets wrong, and how long it takes."""
-    times = interleave({info.name: partial(timed_run, drawing(info, TIMED_SIZE)) for info in methods}, plan)
-    medians: dict[str, Statistics] = {name: statistics_by_stage(outcome)["whole"] for name, outcome in times.items()}
+    times = interleave({info.name: timed(drawing(info, TIMED_SIZE)) for info in methods}, plan)
+    medians: dict[str, Statistics] = {name: statistics_by_stage(outcome)[ALL] for name, outcome in times.items()}
     fastest = min(medians.values(), key=lambda statistics: statistics.median)
     rows = []
     for info in methods:
@@ -68,13 +66,6 @@ def methods_table(methods: list[MethodInfo], plan: Plan) -> str:
         rows.append([info.label, info.backend, *numbers])
         print(rows[-1], flush=True)
     return report.table(["method", "back-end", "wrong pixels", "RMS dt / R", "worst dt / R", "ms", "times the fastest"], rows)
-
-
-def timed_run(draw: Callable[[], object]) -> Sample:
-    """Of one image, milliseconds."""
-    start = time.perf_counter()
-    draw()
-    return {"whole": 1e3 * (time.perf_counter() - start)}
 
 
 def drawing(info: MethodInfo, size: tuple[int, int]) -> Callable[[], meniscus.ImageBuffers]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from meniscus.addon.render.registry import create_method, method_infos
 
 from . import machine, report
 from .mueller_scenes import DATA_SETS, FIELD, DataSet
-from .timing import Plan, Sample, interleave, statistics_by_stage
+from .timing import Plan, repeated
 
 NAME = "mueller-2007"
 PAGE = report.ROOT / "docs" / "mueller_2007.md"
@@ -66,7 +65,7 @@ def list_table(sets: list[DataSet], plan: Plan) -> str:
     rows = []
     for data_set in sets:
         balls = data_set.balls()
-        best = least(lambda balls=balls: find_neighbours(balls), plan)
+        best = repeated(partial(find_neighbours, balls), plan).least
         paper = data_set.paper.milliseconds
         times = f"{float(paper) / best:.0f}" if paper.isdigit() else ""
         rows.append([data_set.label, f"{len(balls):,}", paper, report.milliseconds(best), times])
@@ -96,24 +95,14 @@ def frame_table(info: MethodInfo, sets: list[DataSet], plan: Plan, size: int) ->
     for data_set in sets:
         balls = data_set.balls()
         camera = data_set.camera(balls, size)
-        frames = 1e3 / least(lambda balls=balls, camera=camera: meniscus.render(balls, camera, FIELD, method=info.name), plan)
-        image = meniscus.render(balls, camera, FIELD, method=info.name)
+        draw = partial(meniscus.render, balls, camera, FIELD, method=info.name)
+        frames = 1e3 / repeated(draw, plan).least
+        image = draw()
         paper = data_set.paper.frames[info.name]
         rows.append([data_set.label, f"{paper:g}", f"{frames:.2g}", f"{frames / paper:.2g}", f"{image.hit.mean():.0%}"])
         print(info.name, rows[-1], flush=True)
     headers = [info.label, "paper, images a second", "ours", "times the paper's", "of the image covered"]
     return report.table(headers, rows)
-
-
-def least(action: Callable[[], object], plan: Plan) -> float:
-    """Of several runs, milliseconds."""
-
-    def run() -> Sample:
-        start = time.perf_counter()
-        action()
-        return {"whole": 1e3 * (time.perf_counter() - start)}
-
-    return statistics_by_stage(interleave({"": run}, plan)[""])["whole"].least
 
 
 def save_picture(name: str) -> None:

@@ -14,6 +14,9 @@ Sample = dict[str, float]
 
 Case = TypeVar("Case", bound=Hashable)
 
+ALL = "all"
+"""The stage that is all of it."""
+
 WARM_UPS = 1
 """Rounds that are left out of the statistics, where others were made."""
 
@@ -73,6 +76,22 @@ def statistics_by_stage(outcome: Outcome) -> dict[str, Statistics]:
     samples = outcome.measured()
     stages = list(dict.fromkeys(stage for sample in samples for stage in sample))
     return {stage: statistics([sample[stage] for sample in samples if stage in sample]) for stage in stages}
+
+
+def timed(action: Callable[[], object]) -> Callable[[], Sample]:
+    """Does something, and tells how long the whole of it took."""
+
+    def measure() -> Sample:
+        start = time.perf_counter()
+        action()
+        return {ALL: 1e3 * (time.perf_counter() - start)}
+
+    return measure
+
+
+def repeated(action: Callable[[], object], plan: Plan) -> Statistics:
+    """Do something several times."""
+    return statistics_by_stage(interleave({"": timed(action)}, plan)[""])[ALL]
 
 
 def interleave(cases: Mapping[Case, Callable[[], Sample]], plan: Plan) -> dict[Case, Outcome]:
