@@ -22,6 +22,7 @@ _HOMES = {
     "FittedBvh": ".addon.render.fitted_bvh",
     "ImageBuffers": ".addon.fluid.image",
     "Look": ".addon.fluid.look",
+    "SurfaceParticles": ".addon.render.surface_particles",
     "Tracing": ".addon.fluid.tracing",
     "MeniscusError": ".addon.fluid.errors",
     "methods": ".addon.render.registry",

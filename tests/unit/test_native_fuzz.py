@@ -186,11 +186,17 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "number": lambda sizes: st.integers(0, 2**32 - 1),
     "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
     "behind": lambda sizes: st.none() | st.tuples(*[st.floats(width=32)] * 4),
+    "velocities": lambda sizes: st.none() | array("f4", -2, 2, sizes.balls, 3),
+    "points": lambda sizes: st.none() | array("f4", -2, 2, sizes.rays, 3),
+    "count": lambda sizes: st.integers(1, 40),
+    "cell_share": lambda sizes: st.sampled_from([0.05, 0.3, 1.0]),
+    "steps": lambda sizes: st.integers(0, 3),
+    "seed": lambda sizes: st.integers(0, 2**32 - 1),
     "most": lambda sizes: st.integers(0, 2**32 - 1),
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
-FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves", "is_film_clear")
+FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves", "is_film_clear", "disperses", "fills_gaps")
 FITTING["coefficients"] = FITTING["kernel"]
 FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}

@@ -20,5 +20,7 @@ pub mod placing;
 pub mod rasterizer;
 pub mod shading;
 pub mod simd;
+pub mod surface_particles;
 pub mod tile_caster;
 pub mod tracing;
+mod vectors;

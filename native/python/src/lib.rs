@@ -10,6 +10,7 @@ mod oracle;
 mod rasterizer;
 mod run;
 mod shading;
+mod surface_particles;
 mod tile_caster;
 mod tracing;
 
@@ -33,6 +34,8 @@ mod meniscus_native {
     use super::rasterizer::{displace, rasterize};
     #[pymodule_export]
     use super::shading::{label, place, shade_image, shade_points};
+    #[pymodule_export]
+    use super::surface_particles::SurfaceParticles;
     #[pymodule_export]
     use super::tile_caster::{TileCaster, simd_path, simd_paths};
     #[pymodule_export]

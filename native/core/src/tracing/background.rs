@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::tile_caster::View;
 
-use super::vectors::{plus, unit};
 use super::world::World;
+use crate::vectors::{plus, unit};
 
 /// Fills an image, row 0 at the bottom, with what comes from afar; it is opaque.
 ///

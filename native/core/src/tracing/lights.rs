@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::shading::{Light, LightKind};
 
 use super::random;
-use super::vectors::{along, cross, difference, dot, double, plus, unit};
+use crate::vectors::{along, cross, difference, dot, double, plus, unit};
 
 /// Light that comes to a point.
 #[derive(Clone, Copy, Debug)]

@@ -6,11 +6,10 @@
 mod background;
 mod lights;
 mod paths;
-mod random;
+pub(crate) mod random;
 #[cfg(test)]
 mod tests;
 mod triangles;
-mod vectors;
 mod world;
 
 use rayon::prelude::*;

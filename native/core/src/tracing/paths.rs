@@ -10,8 +10,8 @@ use crate::simd::{LANES, Lanes, Simd, Vector};
 use super::lights::{self, Shine};
 use super::random;
 use super::triangles::{TriangleCaster, TriangleHit};
-use super::vectors::{along, dot, double, plus, single, tangents, unit};
 use super::{Scene, Settings, Surfaces};
+use crate::vectors::{along, dot, double, plus, single, tangents, unit};
 
 /// Paths that have met so many surfaces follow one way of those that open up, not both.
 const SPLITS: u32 = 2;

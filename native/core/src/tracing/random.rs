@@ -56,6 +56,15 @@ fn scrambled(number: u32, seed: u32) -> u32 {
     number
 }
 
+/// A direction that follows from a number, any as likely as any other.
+pub fn any_direction(number: u32) -> [f64; 3] {
+    let fraction = |number: u32| f64::from(mixed(number)) / f64::from(u32::MAX);
+    let z = 2.0 * fraction(number) - 1.0;
+    let (sine, cosine) = (TAU * fraction(number ^ 0x55aa_55aa)).sin_cos();
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    [radius * cosine, radius * sine, z]
+}
+
 /// A direction about z, by the cosine of the angle to it.
 #[inline(always)]
 pub fn by_cosine([u, v]: [f64; 2]) -> [f64; 3] {
@@ -77,11 +86,11 @@ pub fn in_cone([u, v]: [f64; 2], one_less_cosine: f64) -> [f64; 3] {
 /// and Benyoub 2023).
 #[inline(always)]
 pub fn facet([x, y, z]: [f64; 3], alpha: f64, [u, v]: [f64; 2]) -> [f64; 3] {
-    let eye = super::vectors::unit([alpha * x, alpha * y, z]);
+    let eye = crate::vectors::unit([alpha * x, alpha * y, z]);
     let (sine, cosine) = (TAU * u).sin_cos();
     let height = (1.0 - v) * (1.0 + eye[2]) - eye[2];
     let radius = (1.0 - height * height).max(0.0).sqrt();
-    super::vectors::unit([alpha * (radius * cosine + eye[0]), alpha * (radius * sine + eye[1]), (height + eye[2]).max(1e-9)])
+    crate::vectors::unit([alpha * (radius * cosine + eye[0]), alpha * (radius * sine + eye[1]), (height + eye[2]).max(1e-9)])
 }
 
 #[cfg(test)]

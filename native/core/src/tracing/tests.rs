@@ -4,11 +4,11 @@ use proptest::prelude::*;
 
 use super::random;
 use super::triangles::{TriangleCaster, TriangleHit};
-use super::vectors::{along, cross, difference, dot, plus, tangents, unit};
 use super::*;
 use crate::fitted_bvh::ray::Ray;
 use crate::shading::material::{Parameters, Triple};
 use crate::simd::{LANES, Lanes, Vector};
+use crate::vectors::{along, cross, difference, dot, plus, tangents, unit};
 
 /// Casts one ray at triangles.
 struct Shot<'a> {

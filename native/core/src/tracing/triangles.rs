@@ -13,7 +13,7 @@ use crate::job::Job;
 use crate::memory;
 use crate::simd::{LANES, Lanes, Mask, Simd, Vector};
 
-use super::vectors::{cross, difference, dot};
+use crate::vectors::{cross, difference, dot};
 
 /// Where a node may be cut along an axis.
 const BINS: usize = 16;

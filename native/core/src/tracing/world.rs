@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use crate::error::{Error, Result};
 use crate::memory;
 
-use super::vectors::{dot, double};
+use crate::vectors::{dot, double};
 
 /// Columns and rows of what surfaces of every direction get; the error of lines between is a thousandth.
 const IRRADIANCE: [usize; 2] = [64, 32];

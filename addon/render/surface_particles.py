@@ -1,0 +1,137 @@
+"""Points that live on the surface of a fluid and move with it (van Kooten, van den Bergen and Telea 2007)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fluid.balls import Balls
+from ..fluid.errors import InputError
+from ..fluid.field import Field
+from . import native
+
+MOST_SECONDS = 1e6
+"""Longer steps in time are a mistake."""
+
+
+@dataclass(frozen=True)
+class ParticleCloud:
+    """Surface particles of one frame, in no order.
+
+    Attributes
+    ----------
+    positions, normals
+        (M, 3) float32, world space: on the surface, and unit, out of the fluid.
+    velocities
+        (M, 3) float32, units a second: of the surface there, as far as balls have velocities.
+    spacings
+        (M,) float32: the distance to its neighbours if they were spread evenly as densely as they are here.
+    ids
+        (M,) uint32: stays with a particle until that is placed anew.
+    """
+
+    positions: npt.NDArray[np.float32]
+    normals: npt.NDArray[np.float32]
+    velocities: npt.NDArray[np.float32]
+    spacings: npt.NDArray[np.float32]
+    ids: npt.NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
+class ParticleReport:
+    """How many particles lost the surface, were placed anew, and left a dense place for a thin one."""
+
+    lost: int
+    placed: int
+    dispersed: int
+
+
+class SurfaceParticles:
+    """Particles that follow a fluid from frame to frame.
+
+    Parameters
+    ----------
+    count
+        How many there are at most.
+    cell_share
+        The side of the spatial hash's cells as a share of a ball's diameter, 0.05 to 1 (the paper: a third to a fifth).
+    steps
+        Steps of repulsion in each frame, 0 to 1000.
+    disperses
+        Whether particles also leave dense places for thin ones (section 7.4).
+    fills_gaps
+        Whether places without particles get some at once, those of new droplets too.
+    seed
+        Another number, another spread.
+
+    Raises
+    ------
+    InputError
+        A parameter is out of its range.
+    DeviceError
+        The native core is missing.
+    """
+
+    def __init__(
+        self,
+        count: int = 16384,
+        *,
+        cell_share: float = 1 / 3,
+        steps: int = 4,
+        disperses: bool = True,
+        fills_gaps: bool = True,
+        seed: int = 0,
+    ) -> None:
+        options = {"cell_share": cell_share, "steps": steps, "disperses": disperses, "fills_gaps": fills_gaps, "seed": seed}
+        with native.translated_errors():
+            self._particles = native.load().SurfaceParticles(count=count, **options)
+
+    def seed(
+        self,
+        balls: Balls,
+        field: Field,
+        points: npt.NDArray[np.float32] | None = None,
+        *,
+        threads: int = 0,
+        watch: Callable[[float], object] = native.let_interrupt,
+    ) -> ParticleReport:
+        """Begin anew on these balls: all over their surface, or at `points` (K, 3), each moved onto the surface near it.
+
+        Raises
+        ------
+        InputError, DeviceError
+            The points or the kernel are unusable; there is too little memory.
+        """
+        if points is not None:
+            points = np.ascontiguousarray(points, np.float32)
+        return self._go(balls, field, threads, watch, points=points)
+
+    def follow(
+        self,
+        balls: Balls,
+        field: Field,
+        seconds: float,
+        *,
+        threads: int = 0,
+        watch: Callable[[float], object] = native.let_interrupt,
+    ) -> ParticleReport:
+        """Follow the fluid to these balls of `seconds` later, by the velocities of the balls before (equations 2 and 3).
+
+        After a cut or a jump in time call :meth:`seed` instead. The errors are those of :meth:`seed`.
+        """
+        if not 0 <= seconds <= MOST_SECONDS:
+            raise InputError(f"The time between two frames must be 0 to {MOST_SECONDS:g} seconds, not {seconds}")
+        return self._go(balls, field, threads, watch, seconds=float(seconds))
+
+    def _go(self, balls: Balls, field: Field, threads: int, watch: Callable[[float], object], **how: object) -> ParticleReport:
+        given = native.fluid_arguments(balls, field)
+        with native.translated_errors():
+            return ParticleReport(*self._particles.go(*given, velocities=balls.velocities, threads=threads, watch=watch, **how))
+
+    @property
+    def cloud(self) -> ParticleCloud:
+        """The particles."""
+        return ParticleCloud(*self._particles.arrays())

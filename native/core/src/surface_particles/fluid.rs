@@ -1,0 +1,212 @@
+//! The density and its derivatives at points (van Kooten, van den Bergen and Telea 2007, section 7.2).
+
+use crate::balls::Balls;
+use crate::error::{Error, Result};
+use crate::field::Field;
+use crate::memory;
+use crate::vectors::{difference, dot, double, plus};
+
+use super::hash::BallHash;
+
+/// How often a point is moved onto the surface.
+const PROJECTIONS: usize = 8;
+
+/// A projection goes at most so far, in influence radii: beyond it the slope says nothing.
+const LONGEST_PROJECTION: f64 = 0.25;
+
+/// How near to the surface a point must come, in influence radii.
+const NEAR: f64 = 1e-3;
+
+/// What the balls give at a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// F.
+    pub density: f64,
+    /// The derivative of F by the point.
+    pub gradient: [f64; 3],
+    /// How fast F changes at the point because balls move: its derivative by their positions times their velocities.
+    pub rate: f64,
+    /// The mean of the balls' velocities, weighted by the lengths of their gradients (equation 3).
+    pub velocity: [f64; 3],
+    /// The least influence radius of the balls that reach the point, 0 where none does.
+    pub radius: f64,
+}
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// World space.
+    pub position: [f64; 3],
+    /// Unit, out of the fluid.
+    pub normal: [f64; 3],
+}
+
+/// Moving balls, and which of them reach a point.
+#[derive(Debug)]
+pub struct Fluid {
+    centers: Vec<[f32; 3]>,
+    radii: Vec<f32>,
+    weights: Vec<f32>,
+    /// None where nothing moves.
+    velocities: Option<Vec<[f32; 3]>>,
+    field: Field,
+    cell_share: f64,
+    hash: BallHash,
+}
+
+impl Fluid {
+    /// Copies the balls; `velocities` are in units a second.
+    ///
+    /// # Errors
+    /// `InvalidInput` where velocities are not one finite vector for each ball; `OutOfMemory`.
+    pub fn new(balls: &Balls<'_>, velocities: Option<&[[f32; 3]]>, field: Field, cell_share: f64) -> Result<Self> {
+        if let Some(velocities) = velocities {
+            let are_finite = velocities.as_flattened().iter().all(|number| number.is_finite());
+            if velocities.len() != balls.len() || !are_finite {
+                return Err(Error::InvalidInput(format!(
+                    "velocities must be a finite vector for each of {} balls",
+                    balls.len()
+                )));
+            }
+        }
+        let hash = BallHash::new(balls.positions(), balls.radii(), cell_share)?;
+        Ok(Self {
+            centers: copied(balls.positions())?,
+            radii: copied(balls.radii())?,
+            weights: copied(balls.weights())?,
+            velocities: velocities.map(copied).transpose()?,
+            field,
+            cell_share,
+            hash,
+        })
+    }
+
+    /// The same balls some seconds later, as their velocities take them.
+    ///
+    /// # Errors
+    /// `OutOfMemory`.
+    pub fn moved(&self, seconds: f64) -> Result<Self> {
+        let mut centers = copied(&self.centers)?;
+        for (center, velocity) in centers.iter_mut().zip(self.velocities.iter().flatten()) {
+            *center = crate::vectors::single(plus(double(*center), seconds, double(*velocity)));
+        }
+        Ok(Self {
+            hash: BallHash::new(&centers, &self.radii, self.cell_share)?,
+            centers,
+            radii: copied(&self.radii)?,
+            weights: copied(&self.weights)?,
+            velocities: self.velocities.as_deref().map(copied).transpose()?,
+            ..*self
+        })
+    }
+
+    /// The greatest speed of a ball, in its influence radii a second.
+    pub fn greatest_speed(&self) -> f64 {
+        let speed =
+            |(velocity, radius): (&[f32; 3], &f32)| dot(double(*velocity), double(*velocity)).sqrt() / f64::from(*radius);
+        self.velocities.iter().flatten().zip(&self.radii).map(speed).fold(0.0, f64::max)
+    }
+
+    /// How many balls there are.
+    pub fn len(&self) -> usize {
+        self.radii.len()
+    }
+
+    /// A ball's centre, influence radius and weight.
+    pub fn ball(&self, ball: usize) -> ([f64; 3], f64, f64) {
+        (double(self.centers[ball]), f64::from(self.radii[ball]), f64::from(self.weights[ball]))
+    }
+
+    /// The field.
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
+
+    /// Whether a ball takes density away.
+    pub fn carves(&self) -> bool {
+        self.weights.iter().any(|weight| *weight < 0.0)
+    }
+
+    /// Whether a point is in the fluid.
+    pub fn is_inside(&self, point: [f64; 3]) -> bool {
+        let mut density = 0.0;
+        self.hash.for_near(point, |ball| {
+            let offset = difference(point, double(self.centers[ball]));
+            let x = 1.0 - dot(offset, offset) / f64::from(self.radii[ball]).powi(2);
+            density += f64::from(self.weights[ball]) * self.field.kernel.value(x);
+        });
+        density >= self.field.isovalue
+    }
+
+    /// The density at a point and what it changes with.
+    pub fn sample(&self, point: [f64; 3]) -> Sample {
+        let mut sample = Sample { radius: f64::INFINITY, ..Sample::default() };
+        let (mut velocity, mut weights) = ([0.0; 3], 0.0);
+        self.hash.for_near(point, |ball| {
+            let radius = f64::from(self.radii[ball]);
+            let offset = difference(point, double(self.centers[ball]));
+            let x = 1.0 - dot(offset, offset) / (radius * radius);
+            if x <= 0.0 {
+                return;
+            }
+            let weight = f64::from(self.weights[ball]);
+            let slope = offset.map(|c| -2.0 * weight * self.field.kernel.derivative(x) / (radius * radius) * c);
+            sample.density += weight * self.field.kernel.value(x);
+            sample.gradient = plus(sample.gradient, 1.0, slope);
+            sample.radius = sample.radius.min(radius);
+            if let Some(velocities) = &self.velocities {
+                let own = double(velocities[ball]);
+                let length = dot(slope, slope).sqrt();
+                sample.rate -= dot(slope, own);
+                velocity = plus(velocity, length, own);
+                weights += length;
+            }
+        });
+        if weights > 0.0 {
+            sample.velocity = velocity.map(|c| c / weights);
+        }
+        if sample.radius == f64::INFINITY {
+            sample.radius = 0.0;
+        }
+        sample
+    }
+
+    /// The point of the surface that the slope leads to from a point near it; None where it leads nowhere.
+    pub fn projected(&self, start: [f64; 3]) -> Option<SurfacePoint> {
+        let mut position = start;
+        for _ in 0..PROJECTIONS {
+            let sample = self.sample(position);
+            let slope = dot(sample.gradient, sample.gradient).sqrt();
+            let distance = (self.field.isovalue - sample.density) / slope;
+            if !distance.is_finite() {
+                return None;
+            }
+            if distance.abs() <= NEAR * sample.radius {
+                let normal = sample.gradient.map(|c| -c / slope);
+                return Some(SurfacePoint { position: plus(position, -distance, normal), normal });
+            }
+            let longest = LONGEST_PROJECTION * sample.radius;
+            position = plus(position, distance.clamp(-longest, longest) / slope, sample.gradient);
+        }
+        None
+    }
+}
+
+impl Sample {
+    /// The velocity of a point that stays on the surface and moves as desired where it may (equation 2, corrected: the desired
+    /// velocity is its first term). `feedback` is the share of the excess of density that goes in a second.
+    pub fn constrained(&self, desired: [f64; 3], isovalue: f64, feedback: f64) -> [f64; 3] {
+        let steepness = dot(self.gradient, self.gradient);
+        if steepness < f64::MIN_POSITIVE {
+            return desired;
+        }
+        let excess = dot(self.gradient, desired) + self.rate + feedback * (self.density - isovalue);
+        plus(desired, -excess / steepness, self.gradient)
+    }
+}
+
+fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
+    let mut copy = memory::with_capacity(values.len())?;
+    copy.extend_from_slice(values);
+    Ok(copy)
+}

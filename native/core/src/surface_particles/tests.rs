@@ -1,0 +1,155 @@
+//! Against closed forms: spheres, whose surface is known.
+
+use super::hash::BallHash;
+use super::*;
+use crate::kernel::tests::kernels;
+use crate::vectors::difference;
+
+fn field(isovalue: f64) -> Field {
+    Field::new(kernels()[0].1, isovalue).unwrap()
+}
+
+/// The particles of balls that stand still.
+fn particles(positions: &[[f32; 3]], radii: &[f32], options: Options) -> SurfaceParticles {
+    let weights = vec![1.0; radii.len()];
+    let mut particles = SurfaceParticles::new(options).unwrap();
+    particles.seed(&Balls::new(positions, radii, &weights).unwrap(), None, field(0.2), &Job::default()).unwrap();
+    particles
+}
+
+/// The distances to the nearest other particle.
+fn nearest(particles: &[Particle]) -> Vec<f64> {
+    let distance = |one: &Particle, other: &Particle| {
+        let offset = difference(double(one.position), double(other.position));
+        dot(offset, offset).sqrt()
+    };
+    let others = |one: &Particle| {
+        particles.iter().filter(|other| other.id != one.id).map(|other| distance(one, other)).fold(f64::INFINITY, f64::min)
+    };
+    particles.par_iter().map(others).collect()
+}
+
+fn variation(numbers: &[f64]) -> f64 {
+    let mean = numbers.iter().sum::<f64>() / numbers.len() as f64;
+    (numbers.iter().map(|number| (number - mean).powi(2)).sum::<f64>() / numbers.len() as f64).sqrt() / mean
+}
+
+#[test]
+fn a_lone_ball_is_covered_evenly() {
+    for steps in [0, 4, 10] {
+        let found = particles(&[[1.0, 2.0, 3.0]], &[2.0], Options { count: 1000, steps, ..Options::default() });
+        let radius = 2.0 * field(0.2).kernel_radius_share(1.0);
+        assert_eq!(found.particles().len(), 1000);
+        for particle in found.particles() {
+            let offset = difference(double(particle.position), [1.0, 2.0, 3.0]);
+            assert!((dot(offset, offset).sqrt() - radius).abs() < 1e-5 * radius);
+            assert!(dot(unit(offset), double(particle.normal)) > 0.99999);
+        }
+        let even = even_distance(4.0 * std::f64::consts::PI * radius * radius, 1000);
+        let distances = nearest(found.particles());
+        assert!(variation(&distances) < if steps < 4 { 0.15 } else { 0.1 });
+        assert!(distances.iter().all(|distance| *distance > 0.55 * even));
+        assert!(steps == 0 || (found.reach / (REACH * even) - 1.0).abs() < 0.01, "{}", found.reach / even);
+    }
+}
+
+#[test]
+fn the_hash_finds_each_ball_that_reaches_once() {
+    let random = |index: u32, axis: u32| mixed(branch(7, index * 4 + axis)) as f32 / u32::MAX as f32;
+    let positions: Vec<[f32; 3]> = (0..300).map(|index| [0, 1, 2].map(|axis| 4.0 * random(index, axis) - 2.0)).collect();
+    let radii: Vec<f32> = (0..300).map(|index| 10f32.powf(-2.5 * random(index, 3))).collect();
+    for share in [0.2, 1.0 / 3.0, 1.0] {
+        let hash = BallHash::new(&positions, &radii, share).unwrap();
+        for point in positions.iter().map(|position| double(position.map(|c| c + 0.01))) {
+            let mut found = Vec::new();
+            hash.for_near(point, |ball| found.push(ball));
+            let met = found.len();
+            found.sort_unstable();
+            found.dedup();
+            assert_eq!(found.len(), met);
+            for ball in 0..300 {
+                let offset = difference(point, double(positions[ball]));
+                if dot(offset, offset) < f64::from(radii[ball]).powi(2) {
+                    assert!(found.binary_search(&ball).is_ok());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn particles_go_with_what_moves_and_keep_their_numbers() {
+    let (positions, radii, weights) = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [1.0, 1.2], [1.0, 1.0]);
+    let velocities = [[1.0, -2.0, 0.5]; 2];
+    let mut particles = SurfaceParticles::new(Options { count: 500, steps: 0, ..Options::default() }).unwrap();
+    let balls = Balls::new(&positions, &radii, &weights).unwrap();
+    particles.seed(&balls, Some(&velocities), field(0.2), &Job::default()).unwrap();
+    let before = particles.particles().to_vec();
+    assert!(before.iter().all(|particle| (0..3).all(|axis| (particle.velocity[axis] - velocities[0][axis]).abs() < 1e-5)));
+    let later = positions.map(|[x, y, z]| [x + 0.5, y - 1.0, z + 0.25]);
+    let balls = Balls::new(&later, &radii, &weights).unwrap();
+    let report = particles.follow(&balls, Some(&velocities), field(0.2), 0.5, &Job::default()).unwrap();
+    assert_eq!((report.lost, report.placed), (0, 0));
+    for (particle, before) in particles.particles().iter().zip(&before) {
+        assert_eq!(particle.id, before.id);
+        let expected = plus(double(before.position), 0.5, double(velocities[0]));
+        let apart = difference(double(particle.position), expected);
+        assert!(dot(apart, apart).sqrt() < 1e-3, "{apart:?}");
+    }
+}
+
+#[test]
+fn liquid_that_appears_gets_particles_at_once_and_what_vanishes_gives_its_own_back() {
+    let (positions, radii, weights) =
+        ([[0.0f32, 0.0, 0.0], [9.0, 0.0, 0.0], [-9.0, 0.0, 0.0]], [1.0f32, 1.0, 0.5], [1.0f32; 3]);
+    let options = Options { count: 600, ..Options::default() };
+    let mut particles = particles(&positions[..2], &radii[..2], options);
+    let near = |particles: &SurfaceParticles, x: f32| {
+        particles.particles().iter().filter(|particle| (particle.position[0] - x).abs() < 2.0).count()
+    };
+    assert!(near(&particles, 9.0).abs_diff(300) < 10 && near(&particles, -9.0) == 0);
+    let balls = Balls::new(&positions, &radii, &weights).unwrap();
+    let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
+    assert_eq!(particles.particles().len(), 600);
+    // A quarter of the surface of one of the others.
+    assert!((50..80).contains(&near(&particles, -9.0)), "{} {report:?}", near(&particles, -9.0));
+    let balls = Balls::new(&positions[..1], &radii[..1], &weights[..1]).unwrap();
+    let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
+    assert!(report.lost > 290);
+    particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
+    assert_eq!(particles.particles().len(), 600);
+    assert!(variation(&nearest(particles.particles())) < 0.2);
+}
+
+#[test]
+fn dispersion_spreads_faster_than_repulsion_alone() {
+    let positions: Vec<[f32; 3]> = (0..10).map(|index| [0.5 * index as f32, 0.0, 0.0]).collect();
+    let (radii, weights) = ([1.0; 10], [1.0; 10]);
+    let balls = Balls::new(&positions, &radii, &weights).unwrap();
+    let starts: Vec<[f32; 3]> =
+        (0..1200).map(|index| any_direction(index).map(|c| 0.8 * c as f32)).filter(|start| start[0] < 0.0).collect();
+    let mean_place = |disperses: bool, steps: usize| {
+        let options = Options { count: 1200, steps, disperses, fills_gaps: false, ..Options::default() };
+        let mut particles = SurfaceParticles::new(options).unwrap();
+        particles.seed_at(&starts, &balls, None, field(0.2), &Job::default()).unwrap();
+        assert!(particles.particles().len() > 580);
+        particles.particles().iter().map(|particle| f64::from(particle.position[0])).sum::<f64>()
+            / particles.particles().len() as f64
+    };
+    let (begin, with, without) = (mean_place(false, 0), mean_place(true, 40), mean_place(false, 40));
+    assert!(with - begin > 2.0 * (without - begin) && without > begin, "{begin} {with} {without}");
+}
+
+#[test]
+fn what_has_no_surface_has_no_particles() {
+    let found = particles(&[], &[], Options::default());
+    assert!(found.particles().is_empty());
+    let mut found = SurfaceParticles::new(Options { count: 50, ..Options::default() }).unwrap();
+    let (positions, radii) = ([[1.0; 3]; 2], [1.0; 2]);
+    let balls = Balls::new(&positions, &radii, &[1.0; 2]).unwrap();
+    let report = found.seed(&balls, None, field(3.0), &Job::default()).unwrap();
+    assert_eq!((found.particles().len(), report), (0, Report::default()));
+    // Two at one point that are a surface only together.
+    found.follow(&balls, None, field(1.5), 0.04, &Job::default()).unwrap();
+    assert_eq!(found.particles().len(), 50);
+}
