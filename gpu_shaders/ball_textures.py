@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..addon.fluid.camera import Camera
 from ..addon.fluid.view_balls import ViewBalls
 from ..addon.render.method import Attribute
+from .camera_parts import depth_scale
 from .programs import ROW_TEXTURE_WIDTH
 from .row_texture import Rows, row_texture
 
@@ -71,10 +72,10 @@ class BallDistances:
         """Of balls that meet the view of this camera."""
         distances = np.linalg.norm(balls.centers, axis=1) if camera.is_perspective else -balls.centers[:, 2]
         start = camera.clip_start * float(np.hypot.reduce([1.0, *_steepest_slope(camera)]))
-        scale = 2.0 ** -(np.ceil(np.log2(max(float(np.max(distances + balls.radii)), start))) + 1)
+        scale = depth_scale(max(float(np.max(distances + balls.radii)), start))
         may_start_inside = bool(np.any(distances - balls.radii <= start * (1 + 1e-5)))
         # The shaders round where each ray starts, and must not find it beyond the greatest.
-        return cls(float(scale), start * float(scale) * (1 + 1e-6), may_start_inside or bool(np.any(balls.weights < 0)))
+        return cls(scale, start * scale * (1 + 1e-6), may_start_inside or bool(np.any(balls.weights < 0)))
 
 
 def _steepest_slope(camera: Camera) -> tuple[float, float]:

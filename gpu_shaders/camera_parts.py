@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from ..addon.fluid.camera import Camera, Region
@@ -19,6 +20,11 @@ def camera_uniforms(camera: Camera) -> dict[str, object]:
         "clip_distances": (camera.clip_start, camera.clip_end),
         "world_from_view": tuple(camera.world_from_view[:3, :3].T.ravel()),
     }
+
+
+def depth_scale(farthest: float) -> float:
+    """A power of two, so that scaling loses nothing, which brings distances up to this one below 1/2 or, just, to it."""
+    return float(2.0 ** -(math.ceil(math.log2(farthest)) + 1))
 
 
 def image_parts(camera: Camera, most_pixels: int, longest_side: int) -> Iterator[Region]:

@@ -194,5 +194,5 @@ def test_a_scene_that_only_shows_its_panel_still_never_saw_meniscus(meniscus, em
     version_update = module(meniscus, "blender.version_update")
     empty_scene.meniscus.version = 0
     assert not version_update._was_used(empty_scene)
-    empty_scene.meniscus.method_settings.name  # noqa: B018 - reading makes the group
+    _ = empty_scene.meniscus.method_settings.name  # reading makes the group
     assert not version_update._was_used(empty_scene)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import moderngl
@@ -13,7 +12,7 @@ from ....addon.fluid.camera import Camera
 from ....addon.fluid.errors import InputError
 from ....addon.render.glyphs import Glyphs, ViewGlyphs, glyphs_of, in_view
 from ....addon.render.method import Attribute, Request, timed
-from ...camera_parts import camera_uniforms
+from ...camera_parts import camera_uniforms, depth_scale
 from ...context import GpuContext, shared_context
 from ...parted_method import PartedMethod
 from ...programs import ROW_TEXTURE_WIDTH
@@ -112,9 +111,8 @@ def _attribute_rows(
 
 
 def _depth_scale(seen: ViewGlyphs) -> float:
-    """A power of two, so that scaling loses nothing, which brings all planar depths below 1."""
-    farthest = float(np.max(seen.glyphs.reaches[seen.chosen] - seen.centers[:, 2]))
-    return 2.0 ** -(math.ceil(math.log2(farthest)) + 1)
+    """Of planar depths."""
+    return depth_scale(float(np.max(seen.glyphs.reaches[seen.chosen] - seen.centers[:, 2])))
 
 
 def create() -> GlyphsMethod:

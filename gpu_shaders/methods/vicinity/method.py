@@ -15,6 +15,7 @@ from ....addon.fluid.errors import InputError
 from ....addon.fluid.kernels import KERNELS, PolynomialKernel
 from ....addon.render.method import Request, timed
 from ....addon.render.neighbours import MOST_NEIGHBOURS, Neighbours, find_neighbours
+from ...camera_parts import depth_scale
 from ...context import GpuContext, shared_context
 from ...parted_method import PartedMethod
 from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
@@ -178,12 +179,12 @@ def _check(request: Request) -> None:
 
 
 def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
-    """A power of two, so that scaling loses nothing, which brings distances from the anchor's plane below 1/2."""
+    """Of distances from the anchor's plane."""
     window = camera.window
     slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
     stretch = math.hypot(1.0, *slopes) if camera.is_perspective else 1.0
     farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
-    return float(2.0 ** -(math.ceil(math.log2(max(farthest, 1e-30))) + 1))
+    return depth_scale(max(farthest, 1e-30))
 
 
 def _draw(

@@ -87,8 +87,8 @@ class Frame:
         """Walk until an end is reached; counts of what happened."""
         self._enter()
         if budget.is_limited:
-            # What was asked for before is not what a pass costs.
-            self._at_start.samples  # noqa: B018 - waits
+            # This waits: what was asked for before is not what a pass costs.
+            _ = self._at_start.samples
         budget.begin_part(self._targets.shared.size[0] * self._targets.shared.size[1])
         passes = self._walk(ending, budget)
         self._count_walking(self._at_end)
