@@ -7,11 +7,13 @@ import traceback
 import bpy
 import gpu
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ..fluid.cryptomatte import layer_names
 from ..fluid.errors import CancelledError, MeniscusError
 from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
+from ..render.instant import Sequence
 from .engine_name import ENGINE
 from .read_lighting import read_lighting
 from .read_meshes import read_meshes
@@ -110,7 +112,8 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
         settings = RenderSettings.of(depsgraph.scene_eval, view_layer, resolution=(self.resolution_x, self.resolution_y))
         self._show_progress(0.0, "Reading the scene")
         read = read_view_layer(depsgraph, settings, lambda frame, subframe: self.frame_set(frame, subframe=subframe))
-        image = read.image(Control(self.test_break, self._show_progress))
+        sequence = _sequence_of(depsgraph.scene.name_full, view_layer.name)
+        image = read.image(Control(self.test_break, self._show_progress, sequence=sequence))
         for sentence in filter(None, (image.info.dropped_text, *image.info.notes)):
             self.report({"WARNING"}, sentence)
         self._give(view_layer, image)
@@ -142,9 +145,28 @@ class MENISCUS_RE_engine(bpy.types.RenderEngine):
                 whole.stamp_data_add_field(key, value)
 
 
+# Blender makes an engine for each frame of an animation.
+_sequences: dict[tuple[str, str], Sequence] = {}
+
+
+def _sequence_of(scene: str, view_layer: str) -> Sequence:
+    """What the frames of a view layer belong to while Blender renders."""
+    return _sequences.setdefault((scene, view_layer), Sequence())
+
+
+@persistent
+def _end_sequences(*_: object) -> None:
+    _sequences.clear()
+
+
+_ENDS = ("render_complete", "render_cancel", "load_pre")
+
+
 def register() -> None:
     """Offer the engine, and show Blender's own panels that hold for it."""
     bpy.utils.register_class(MENISCUS_RE_engine)
+    for name in _ENDS:
+        getattr(bpy.app.handlers, name).append(_end_sequences)
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.add(ENGINE)
 
@@ -153,6 +175,9 @@ def unregister() -> None:
     """Take the engine away."""
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.discard(ENGINE)
+    for name in _ENDS:
+        getattr(bpy.app.handlers, name).remove(_end_sequences)
+    _end_sequences()
     bpy.utils.unregister_class(MENISCUS_RE_engine)
 
 

@@ -123,6 +123,16 @@ def read_field(scene: bpy.types.Scene) -> Field:
     return Field(kernel=scene.meniscus.kernel, isovalue=scene.meniscus.isovalue)
 
 
+def frame_seconds(scene: bpy.types.Scene) -> float:
+    """How long a frame is shown."""
+    return float(scene.render.fps_base / scene.render.fps)
+
+
+def scene_seconds(scene: bpy.types.Scene) -> float:
+    """The time by the clock of the scene."""
+    return (scene.frame_current + scene.frame_subframe) * frame_seconds(scene)
+
+
 def read_look(scene: bpy.types.Scene, style: str, choices: Mapping[str, Any] | None = None) -> Look:
     """The colour and light that the scene's settings describe, in one of the :data:`look.LOOK_STYLES`.
 

@@ -29,6 +29,7 @@ from ..render.backdrop import Surroundings
 from ..render.cluster_numbers import colored_by_cluster
 from ..render.deep import render_deep
 from ..render.image_memory import ImageMemory
+from ..render.instant import Instant, Sequence
 from ..render.method import timed
 from ..render.method_choice import MethodChoice
 from ..render.pass_images import needed_attributes
@@ -44,7 +45,7 @@ from .preferences import threads_of
 from .read_camera import read_camera
 from .read_lighting import read_lighting
 from .read_meshes import read_meshes, read_moved_vertices
-from .read_scene import Fluid, FluidParts, read_field, read_look, read_parts
+from .read_scene import Fluid, FluidParts, frame_seconds, read_field, read_look, read_parts, scene_seconds
 from .scene_notes import collected_notes
 from .view_layer_passes import cryptomatte_levels, wanted_passes
 
@@ -126,11 +127,14 @@ class Control:
         Told the share that is done, 0 to 1, and what is being done.
     memory
         Where images come from: that of one is used again for the next that is rendered under this control.
+    sequence
+        What the images under this control belong to.
     """
 
     is_cancelled: Callable[[], bool]
     on_progress: Callable[[float, str], None] = lambda share, text: None
     memory: ImageMemory = field(default_factory=ImageMemory)
+    sequence: Sequence = field(default_factory=Sequence)
 
     def watch(self, _share: float) -> None:
         """What native work calls."""
@@ -140,8 +144,9 @@ class Control:
 
 @dataclass(frozen=True)
 class _Moment:
-    """What there is to be seen at one time."""
+    """What there is to be seen at one time, in seconds by the clock of the scene."""
 
+    seconds: float
     camera: Camera
     fluid: Fluid
     field: Field
@@ -252,6 +257,7 @@ class SceneRender:
             memory=control.memory,
             sample=sample,
             display=self.settings.display,
+            instant=Instant(moment.seconds, control.sequence),
         )
 
     def _antialias(self, image: ImageBuffers, control: Control) -> None:
@@ -319,18 +325,16 @@ class _Reader:
         """Fluid that was read so many frames from now, all of it with velocities if its neighbours are known."""
         before, after = (neighbor.fluid for neighbor in neighbors)
         if before is not None or after is not None:
-            fluid = with_motion(fluid, before, after, ((1 + time) * self._frame_seconds, (1 - time) * self._frame_seconds))
+            fluid = with_motion(
+                fluid, before, after, ((1 + time) * frame_seconds(self._scene), (1 - time) * frame_seconds(self._scene))
+            )
         return fluid.joined()
 
     def _motion(self, camera: Camera, neighbors: _Neighbors) -> Motion | None:
         if "vector" not in self.settings.passes:
             return None
         cameras = (camera if neighbor.camera is None else neighbor.camera for neighbor in neighbors)
-        return Motion(*cameras, self._frame_seconds, *(neighbor.vertices for neighbor in neighbors))
-
-    @property
-    def _frame_seconds(self) -> float:
-        return float(self._scene.render.fps_base / self._scene.render.fps)
+        return Motion(*cameras, frame_seconds(self._scene), *(neighbor.vertices for neighbor in neighbors))
 
     def _moment_of(self, fluid: Fluid, meshes: Meshes | None) -> _Moment:
         """What there is to be seen now, with fluid and meshes that are read already."""
@@ -338,6 +342,7 @@ class _Reader:
         lighting = read_lighting(self.depsgraph)
         is_clear = scene.render.film_transparent or not self.depsgraph.view_layer.use_sky
         return _Moment(
+            seconds=scene_seconds(scene),
             camera=self._camera(),
             fluid=fluid,
             field=read_field(scene),

@@ -32,7 +32,7 @@ from .method_settings import read_choice
 from .preferences import preferences
 from .presenter import UNCHANGED, Place, Presenter
 from .read_lighting import read_lighting
-from .read_scene import Fluid, read_field, read_look
+from .read_scene import Fluid, read_field, read_look, scene_seconds
 from .scene_balls import SceneBalls
 from .scene_notes import collected_notes
 from .surroundings_of_view import ViewSurroundings
@@ -301,6 +301,7 @@ def _view(scene: bpy.types.Scene, fluid: Fluid, seen: ViewCamera, look: Look, su
         display=settings.display,
         choice=read_choice(scene),
         threads=chosen.threads,
+        seconds=scene_seconds(scene),
         samples=settings.preview_samples,
         frame_rate=settings.preview_frame_rate,
         memory_limit=chosen.memory_limit << 20,

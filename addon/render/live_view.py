@@ -26,6 +26,7 @@ from .backdrop import Surroundings
 from .cluster_numbers import colored_by_cluster, number_clusters
 from .depth_contrast import spatial_importance
 from .device_image import DeviceImage
+from .instant import Instant, Sequence
 from .method import timed
 from .method_choice import MethodChoice
 from .pace import Pace
@@ -68,6 +69,8 @@ class View:
         Of the method; what it has to hold a pace with counts while views change.
     display, threads
         As for :func:`renderer.render`.
+    seconds
+        When it is, by the clock of the scene; None for a view that stands for itself.
     samples
         How many samples a pixel gets at last, 1 for no antialiasing.
     frame_rate
@@ -89,6 +92,7 @@ class View:
     display: str = METABALLS
     choice: MethodChoice = MethodChoice()
     threads: int = 0
+    seconds: float | None = None
     samples: int = 8
     frame_rate: float = 24.0
     memory_limit: int = 512 << 20
@@ -183,6 +187,7 @@ class LiveView:
         self._asked_at = 0.0
         self._pictures: list[Picture] = []
         self._failure: BaseException | None = None
+        self._sequence = Sequence()
         self.revision = 0
 
     def show(self, view: View) -> None:
@@ -369,6 +374,7 @@ class LiveRenderer:
                     else view.surroundings.backdrop(camera, view.threads, watch_of(is_cancelled, None)),
                     sample=sample,
                     display=view.display,
+                    instant=Instant(view.seconds, live._sequence),
                 )
                 picture = _picture(image, view, is_hurried=is_first and view.hurries)
         except CancelledError:

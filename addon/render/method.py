@@ -18,6 +18,7 @@ from ..fluid.displays import METABALLS
 from ..fluid.field import Field
 from ..fluid.passes import DEPTH_BACKGROUND
 from .image_memory import ImageMemory
+from .instant import Instant
 from .settings import Setting, Value
 
 Backend = Literal["gpu", "cpu"]
@@ -80,6 +81,8 @@ class Request:
         All settings of the method by name, checked, see :class:`settings.Setting`.
     display
         What balls are shown as, one of the method's :attr:`MethodInfo.displays`.
+    instant
+        When it is, for methods that take something from one image to the next.
     """
 
     balls: Balls
@@ -91,6 +94,7 @@ class Request:
     memory: ImageMemory = dataclasses.field(default_factory=ImageMemory)
     settings: Mapping[str, Value] = dataclasses.field(default_factory=dict)
     display: str = METABALLS
+    instant: Instant = dataclasses.field(default_factory=Instant)
 
     @property
     def known_attributes(self) -> tuple[Attribute, ...]:

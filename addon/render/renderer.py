@@ -23,6 +23,7 @@ from .cluster_numbers import known_counts
 from .device_image import DeviceImage
 from .device_tracing import trace_image_on_device
 from .image_memory import ImageMemory
+from .instant import Instant
 from .method import (
     Attribute,
     DeviceMethod,
@@ -66,6 +67,7 @@ def render(
     sample: int = 0,
     settings: Mapping[str, Value] | None = None,
     display: str = METABALLS,
+    instant: Instant | None = None,
 ) -> ImageBuffers:
     """Render the surface of a fluid.
 
@@ -99,6 +101,9 @@ def render(
     display
         What balls are shown as, a name from :data:`displays.DISPLAYS`. Light is traced among metaballs alone, and only they
         have a thickness.
+    instant
+        When it is, so that methods which take something from one image to the next know what came before; None for an image
+        that stands for itself.
 
     Returns
     -------
@@ -111,8 +116,9 @@ def render(
     """
     told = is_cancelled, on_progress
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, *told, threads, settings, display)
-    request = shot.request if memory is None else replace(shot.request, memory=memory)
-    shot = replace(shot, request=request, backdrop=backdrop, motion=motion, sample=sample)
+    shot = replace(shot.at(instant), backdrop=backdrop, motion=motion, sample=sample)
+    if memory is not None:
+        shot = replace(shot, request=replace(shot.request, memory=memory))
     return shot.image(shot.choice.runner.find_surface(shot.request))
 
 
@@ -163,6 +169,7 @@ def render_to_show(
     sample: int = 0,
     settings: Mapping[str, Value] | None = None,
     display: str = METABALLS,
+    instant: Instant | None = None,
 ) -> ImageBuffers | DeviceImage:
     """Render the surface of a fluid for Blender to draw.
 
@@ -174,7 +181,7 @@ def render_to_show(
     ImageBuffers.
     """
     shot = _Shot.prepare(balls, camera, field, method, backend, passes, look, is_cancelled, None, threads, settings, display)
-    shot = replace(shot, backdrop=backdrop, sample=sample)
+    shot = replace(shot.at(instant), backdrop=backdrop, sample=sample)
     runner = shot.choice.runner
     can_stay = not is_read_back and camera.region is None and shot.can_stay_on_device
     if can_stay and isinstance(runner, DeviceMethod) and runner.shares_textures:
@@ -244,6 +251,10 @@ class _Shot:
         watch = watch_of(is_cancelled, on_progress)
         request = Request(balls, camera.cropped(), field, attributes, threads, watch, settings=checked, display=display)
         return cls(choice, request, camera, names, look, notes)
+
+    def at(self, instant: Instant | None) -> _Shot:
+        """The same at some time; None for none."""
+        return self if instant is None else replace(self, request=replace(self.request, instant=instant))
 
     @property
     def can_stay_on_device(self) -> bool:

@@ -118,18 +118,22 @@ class SurfaceParticles:
         threads: int = 0,
         watch: Callable[[float], object] = native.let_interrupt,
     ) -> ParticleReport:
-        """Follow the fluid to these balls of `seconds` later, by the velocities of the balls before (equations 2 and 3).
+        """Follow the fluid to these balls of `seconds` later, or earlier where that is negative, by the velocities of the balls before (equations 2 and 3).
 
         After a cut or a jump in time call :meth:`seed` instead. The errors are those of :meth:`seed`.
         """
-        if not 0 <= seconds <= MOST_SECONDS:
-            raise InputError(f"The time between two frames must be 0 to {MOST_SECONDS:g} seconds, not {seconds}")
+        if not abs(seconds) <= MOST_SECONDS:
+            raise InputError(f"The time between two frames must be at most {MOST_SECONDS:g} seconds, not {seconds}")
         return self._go(balls, field, threads, watch, seconds=float(seconds))
 
     def _go(self, balls: Balls, field: Field, threads: int, watch: Callable[[float], object], **how: object) -> ParticleReport:
         given = native.fluid_arguments(balls, field)
         with native.translated_errors():
             return ParticleReport(*self._particles.go(*given, velocities=balls.velocities, threads=threads, watch=watch, **how))
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return int(self._particles.count())
 
     @property
     def cloud(self) -> ParticleCloud:

@@ -66,6 +66,11 @@ impl SurfaceParticles {
         Ok((lost, placed, dispersed))
     }
 
+    /// How many there are.
+    fn count(&self) -> usize {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).particles().len()
+    }
+
     /// The particles: positions, normals and velocities float32 (M, 3), spacings float32 (M,), ids uint32 (M,).
     fn arrays<'py>(&self, python: Python<'py>) -> PyResult<Arrays<'py>> {
         let particles = self.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -202,7 +202,7 @@ impl SurfaceParticles {
         Fluid::new(balls, velocities, field, self.options.cell_share)
     }
 
-    /// Follows the fluid of the frame before to these balls, some seconds later.
+    /// Follows the fluid of the frame before to these balls, some seconds later; earlier where these are negative.
     ///
     /// # Errors
     /// Those of [`Self::seed`].
@@ -228,7 +228,7 @@ impl SurfaceParticles {
 
     /// Moves the particles with the balls of the frame before (equations 2 and 3, explicit steps).
     fn flow(&mut self, mut fluid: Fluid, seconds: f64) -> Result<()> {
-        let motions = (fluid.greatest_speed() * seconds / LONGEST_MOTION).ceil().clamp(1.0, MOST_MOTIONS as f64);
+        let motions = (fluid.greatest_speed() * seconds.abs() / LONGEST_MOTION).ceil().clamp(1.0, MOST_MOTIONS as f64);
         let step = seconds / motions;
         for motion in 0..motions as usize {
             if motion > 0 {
