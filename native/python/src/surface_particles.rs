@@ -1,8 +1,10 @@
 //! The class `SurfaceParticles` of `meniscus_native`.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use meniscus_core::surface_particles::{Options, Particle, Report, SurfaceParticles as Particles};
+use meniscus_core::surface_particles::{
+    Level, Options, Particle, Report, SurfaceParticles as Particles, SurfacePoint, adapted_reach,
+};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -10,11 +12,18 @@ use crate::arrays::{FluidArrays, Rows};
 use crate::run::{python_error, run};
 
 type Vectors<'py> = Bound<'py, PyArray2<f32>>;
+type HashLevel<'py> = (f64, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
 type Arrays<'py> = (Vectors<'py>, Vectors<'py>, Vectors<'py>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>);
 
 /// Points that live on the surface of a fluid and move with it (van Kooten, van den Bergen and Telea 2007).
 #[pyclass(frozen)]
 pub struct SurfaceParticles(Mutex<Particles>);
+
+impl SurfaceParticles {
+    fn locked(&self) -> MutexGuard<'_, Particles> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 #[pymethods]
 impl SurfaceParticles {
@@ -56,7 +65,7 @@ impl SurfaceParticles {
         let points = points.as_ref().map(Rows::rows);
         let Report { lost, placed, dispersed } = run(python, threads, watch, |job| {
             let (balls, field) = fluid.checked()?;
-            let mut particles = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut particles = self.locked();
             match (seconds, points) {
                 (Some(seconds), _) => particles.follow(&balls, velocities, field, seconds, job),
                 (None, Some(points)) => particles.seed_at(points, &balls, velocities, field, job),
@@ -66,14 +75,89 @@ impl SurfaceParticles {
         Ok((lost, placed, dispersed))
     }
 
+    /// Makes these balls those that particles are to be on, which are moved elsewhere. The arguments are those of `go`.
+    #[pyo3(signature = (positions, radii, weights, kernel, isovalue, *, velocities=None, threads=0, watch=None))]
+    #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
+    fn stand_on(
+        &self,
+        python: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        radii: &Bound<'_, PyAny>,
+        weights: &Bound<'_, PyAny>,
+        kernel: Vec<f64>,
+        isovalue: f64,
+        velocities: Option<&Bound<'_, PyAny>>,
+        threads: usize,
+        watch: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let fluid = FluidArrays::borrow([positions, radii, weights], kernel, isovalue)?;
+        let fluid = fluid.plain();
+        let velocities = velocities.map(|array| Rows::<f32, 3>::borrow("velocities", array)).transpose()?;
+        let velocities = velocities.as_ref().map(Rows::rows);
+        run(python, threads, watch, |_| {
+            let (balls, field) = fluid.checked()?;
+            self.locked().stand_on(&balls, velocities, field)
+        })
+    }
+
+    /// The spatial hash of the present balls: for each octave of radii the side of its cells, where the entries of each bucket
+    /// begin and the last ends, uint32 (B + 1,), and the entries, uint32 (E, 2): the ball and the tag of the cell.
+    fn hash<'py>(&self, python: Python<'py>) -> PyResult<Vec<HashLevel<'py>>> {
+        let arrays = |level: &Level| {
+            let entries: Vec<u32> = level.entries.iter().flat_map(|entry| [entry.ball, entry.tag]).collect();
+            let entries = entries.into_pyarray(python).reshape([level.entries.len(), 2])?;
+            Ok((level.side, level.starts.clone().into_pyarray(python), entries))
+        };
+        self.locked().levels().iter().map(arrays).collect()
+    }
+
+    /// Takes particles that are on the present balls in place of its own, and fills the gaps between them.
+    ///
+    /// positions and normals float32 (M, 3). Returns how many were placed; these are behind the others.
+    #[pyo3(signature = (positions, normals, *, reach, step, threads=0, watch=None))]
+    #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
+    fn refill(
+        &self,
+        python: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        normals: &Bound<'_, PyAny>,
+        reach: f64,
+        step: u32,
+        threads: usize,
+        watch: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<usize> {
+        let positions = Rows::<f32, 3>::borrow("positions", positions)?;
+        let normals = Rows::<f32, 3>::borrow("normals", normals)?;
+        let (positions, normals) = (positions.rows(), normals.rows());
+        run(python, threads, watch, |job| {
+            let places = positions
+                .iter()
+                .zip(normals)
+                .map(|(position, normal)| SurfacePoint { position: position.map(f64::from), normal: normal.map(f64::from) });
+            self.locked().refill(places, reach, step, job)
+        })
+    }
+
+    /// How far particles push one another.
+    #[getter]
+    fn reach(&self) -> f64 {
+        self.locked().reach()
+    }
+
+    /// The reach of the next frame, of the present one and of how many others are within that on average.
+    #[staticmethod]
+    fn adapted_reach(company: f64, reach: f64) -> f64 {
+        adapted_reach(company, reach)
+    }
+
     /// How many there are.
     fn count(&self) -> usize {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).particles().len()
+        self.locked().particles().len()
     }
 
     /// The particles: positions, normals and velocities float32 (M, 3), spacings float32 (M,), ids uint32 (M,).
     fn arrays<'py>(&self, python: Python<'py>) -> PyResult<Arrays<'py>> {
-        let particles = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let particles = self.locked();
         let particles = particles.particles();
         let vectors = |of: fn(&Particle) -> [f32; 3]| {
             let numbers: Vec<f32> = particles.iter().flat_map(of).collect();

@@ -8,7 +8,7 @@ use crate::memory;
 use crate::tracing::random::{any_direction, mixed};
 use crate::vectors::{difference, dot, double, plus};
 
-use super::hash::tag;
+use super::hash::{Cell, tag};
 
 /// A particle as its neighbours see it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,7 +74,7 @@ impl Crowd {
         let mut pressure = Pressure { nearest: f64::INFINITY, ..Pressure::default() };
         let own = own.map(|particle| particle as u32);
         let [x, y, z] = self.cell(position);
-        for step in 0..27i64 {
+        for step in 0..27i32 {
             let cell = [x.wrapping_add(step / 9 - 1), y.wrapping_add(step / 3 % 3 - 1), z.wrapping_add(step % 3 - 1)];
             let (tag, bucket) = (tag(cell), self.bucket(cell));
             let members = &self.members[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
@@ -108,11 +108,11 @@ impl Crowd {
         Ok(pressures)
     }
 
-    fn cell(&self, point: [f64; 3]) -> [i64; 3] {
-        point.map(|coordinate| (coordinate / self.reach).floor() as i64)
+    fn cell(&self, point: [f64; 3]) -> Cell {
+        point.map(|coordinate| (coordinate / self.reach).floor() as i32)
     }
 
-    fn bucket(&self, [x, y, z]: [i64; 3]) -> usize {
+    fn bucket(&self, [x, y, z]: Cell) -> usize {
         let mix = mixed(mixed(mixed(x as u32) ^ y as u32) ^ z as u32);
         mix as usize & (self.starts.len() - 2)
     }

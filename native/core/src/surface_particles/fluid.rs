@@ -50,7 +50,6 @@ pub struct Fluid {
     /// None where nothing moves.
     velocities: Option<Vec<[f32; 3]>>,
     field: Field,
-    cell_share: f64,
     hash: BallHash,
 }
 
@@ -76,35 +75,13 @@ impl Fluid {
             weights: copied(balls.weights())?,
             velocities: velocities.map(copied).transpose()?,
             field,
-            cell_share,
             hash,
         })
     }
 
-    /// The same balls some seconds later, as their velocities take them.
-    ///
-    /// # Errors
-    /// `OutOfMemory`.
-    pub fn moved(&self, seconds: f64) -> Result<Self> {
-        let mut centers = copied(&self.centers)?;
-        for (center, velocity) in centers.iter_mut().zip(self.velocities.iter().flatten()) {
-            *center = crate::vectors::single(plus(double(*center), seconds, double(*velocity)));
-        }
-        Ok(Self {
-            hash: BallHash::new(&centers, &self.radii, self.cell_share)?,
-            centers,
-            radii: copied(&self.radii)?,
-            weights: copied(&self.weights)?,
-            velocities: self.velocities.as_deref().map(copied).transpose()?,
-            ..*self
-        })
-    }
-
-    /// The greatest speed of a ball, in its influence radii a second.
-    pub fn greatest_speed(&self) -> f64 {
-        let speed =
-            |(velocity, radius): (&[f32; 3], &f32)| dot(double(*velocity), double(*velocity)).sqrt() / f64::from(*radius);
-        self.velocities.iter().flatten().zip(&self.radii).map(speed).fold(0.0, f64::max)
+    /// Which balls reach a point.
+    pub fn hash(&self) -> &BallHash {
+        &self.hash
     }
 
     /// How many balls there are.

