@@ -41,12 +41,36 @@ class ParticleCloud:
 
 
 @dataclass(frozen=True)
+class HashLevel:
+    """The spatial hash of the balls whose radii are in one octave (sections 7.2.4 and 7.2.5).
+
+    Attributes
+    ----------
+    side
+        Of a cell, Blender units.
+    starts
+        (B + 1,) uint32: where the entries of each of B buckets begin, a power of two, and where the last ends.
+    entries
+        (E, 2) uint32: a ball, and the tag of a cell that it reaches.
+    """
+
+    side: float
+    starts: npt.NDArray[np.uint32]
+    entries: npt.NDArray[np.uint32]
+
+
+@dataclass(frozen=True)
 class ParticleReport:
     """How many particles lost the surface, were placed anew, and left a dense place for a thin one."""
 
     lost: int
     placed: int
     dispersed: int
+
+
+def adapted_reach(company: float, reach: float) -> float:
+    """The reach of a frame, of the one before and of how many others are within that on average."""
+    return float(native.load().SurfaceParticles.adapted_reach(company, reach))
 
 
 class SurfaceParticles:
@@ -130,6 +154,47 @@ class SurfaceParticles:
         given = native.fluid_arguments(balls, field)
         with native.translated_errors():
             return ParticleReport(*self._particles.go(*given, velocities=balls.velocities, threads=threads, watch=watch, **how))
+
+    def stand_on(
+        self, balls: Balls, field: Field, *, threads: int = 0, watch: Callable[[float], object] = native.let_interrupt
+    ) -> None:
+        """Make these balls those that the particles are to be on, which are moved elsewhere; the errors are those of `seed`."""
+        given = native.fluid_arguments(balls, field)
+        with native.translated_errors():
+            self._particles.stand_on(*given, velocities=balls.velocities, threads=threads, watch=watch)
+
+    def hash(self) -> list[HashLevel]:
+        """Which of the present balls reach a point."""
+        return [HashLevel(*level) for level in self._particles.hash()]
+
+    def refill(
+        self,
+        positions: npt.NDArray[np.float32],
+        normals: npt.NDArray[np.float32],
+        *,
+        reach: float,
+        step: int,
+        threads: int = 0,
+        watch: Callable[[float], object] = native.let_interrupt,
+    ) -> int:
+        """Take particles at (M, 3), which are on the present balls, in place of its own, and fill the gaps between them.
+
+        Parameters
+        ----------
+        reach
+            How far particles push one another, Blender units.
+        step
+            A number that differs from frame to frame, which the places depend on.
+
+        Returns how many were placed; in the cloud they come last. The errors are those of `seed`.
+        """
+        with native.translated_errors():
+            return int(self._particles.refill(positions, normals, reach=reach, step=step, threads=threads, watch=watch))
+
+    @property
+    def reach(self) -> float:
+        """How far particles push one another, Blender units."""
+        return float(self._particles.reach)
 
     def __len__(self) -> int:
         """How many there are."""

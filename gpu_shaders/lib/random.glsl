@@ -55,6 +55,14 @@ vec2 random_square(uint seed, uint index) {
     return vec2(random_fraction(index, random_branch(seed, 1u)), y);
 }
 
+// A direction that follows from a number, any as likely as any other.
+vec3 random_direction(uint number) {
+    const float MOST = 4294967295.0;
+    float z = 2.0 * (float(random_mixed(number)) / MOST) - 1.0;
+    float turn = TAU * (float(random_mixed(number ^ 0x55aa55aau)) / MOST);
+    return vec3(sqrt(max(1.0 - z * z, 0.0)) * vec2(cos(turn), sin(turn)), z);
+}
+
 // A vector given along two unit vectors at right angles to a unit normal, and along that; without a seam but where it points down
 // (Duff et al. 2017).
 vec3 random_along(vec3 normal, vec3 local) {

@@ -1,0 +1,197 @@
+"""Surface particles that move on the graphics processor.
+
+What happens in a frame is what :class:`surface_particles.SurfaceParticles` does, pass by pass and with the same numbers: the
+balls of the frame before carry the particles, they settle on the new surface, the native core fills gaps, and steps of repulsion and
+dispersion spread them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from ....addon.fluid.balls import Balls
+from ....addon.fluid.field import Field
+from ....addon.render.native import let_interrupt
+from ....addon.render.surface_particles import ParticleReport, SurfaceParticles, adapted_reach
+from ...context import GpuContext
+from ...step import Step
+from .crowds import Crowd
+from .fluid import FluidArrays, FluidTextures
+from .programs import MotionPrograms
+from .state import FloatArray, ParticleState, Pressures
+
+Watch = Callable[[float], object]
+Doubles = npt.NDArray[np.float64]
+
+PUSH = 0.1
+"""How far pressure moves a particle in a step, in reaches; see native/core/src/surface_particles/mod.rs."""
+
+
+@dataclass(frozen=True)
+class SimulationOptions:
+    """How the particles behave, see :class:`surface_particles.SurfaceParticles`."""
+
+    count: int
+    cell_share: float = 1 / 3
+    steps: int = 4
+    disperses: bool = True
+    fills_gaps: bool = True
+    seed: int = 0
+
+
+class GpuSurfaceParticles:
+    """Particles that follow a fluid from frame to frame, on one OpenGL context.
+
+    Parameters
+    ----------
+    context
+        Where they move.
+    crowd
+        What finds their neighbours; made on the context's thread.
+    options
+        How they behave.
+    """
+
+    def __init__(self, context: GpuContext, crowd: Crowd, options: SimulationOptions) -> None:
+        self._context, self._crowd, self._options = context, crowd, options
+        # Places particles and fills gaps, from the anchor as the shaders see them.
+        self._native = SurfaceParticles(
+            options.count,
+            cell_share=options.cell_share,
+            steps=0,
+            disperses=False,
+            fills_gaps=options.fills_gaps,
+            seed=options.seed,
+        )
+        self._fluid: FluidTextures | None = None
+        self._state: ParticleState | None = None
+        self._pressures: Pressures | None = None
+        self._reach = 0.0
+        self._step = 0
+
+    def __len__(self) -> int:
+        return 0 if self._state is None else self._state.count
+
+    def seed(self, balls: Balls, field: Field, *, threads: int = 0, watch: Watch = let_interrupt) -> ParticleReport:
+        """Begin anew, see :meth:`surface_particles.SurfaceParticles.seed`; DeviceError also where the driver has too little."""
+        self._fluid = self._state = self._pressures = None  # their memory may be needed
+        anchor = _anchor(balls)
+        near = _from_anchor(balls, anchor)
+        placed = self._native.seed(near, field, threads=threads, watch=watch).placed
+        self._reach, self._step = self._native.reach, 0
+        arrays = FluidArrays.of(near, field, self._native.hash(), anchor)
+        cloud = self._native.cloud
+        dispersed = self._context.run(lambda: self._begin(arrays, cloud.positions, cloud.normals))
+        return ParticleReport(0, placed, dispersed)
+
+    def follow(
+        self, balls: Balls, field: Field, seconds: float, *, threads: int = 0, watch: Watch = let_interrupt
+    ) -> ParticleReport:
+        """Follow the fluid, see :meth:`surface_particles.SurfaceParticles.follow`."""
+        before, state = self._fluid, self._state
+        if before is None or state is None:
+            return self.seed(balls, field, threads=threads, watch=watch)
+        anchor = _anchor(balls)
+        near = _from_anchor(balls, anchor)
+        self._native.stand_on(near, field, threads=threads, watch=watch)
+        arrays = FluidArrays.of(near, field, self._native.hash(), anchor)
+        fluid, places, normals = self._context.run(lambda: self._carry(state, before, arrays, seconds))
+        is_there = places[:, 3] > 0
+        positions, normals = np.ascontiguousarray(places[is_there, :3]), np.ascontiguousarray(normals[is_there, :3])
+        placed = 0
+        if self._options.fills_gaps:
+            self._step += 1
+            given = {"reach": self._reach, "step": self._step}
+            placed = self._native.refill(positions, normals, **given, threads=threads, watch=watch)
+            positions, normals = self._native.cloud.positions, self._native.cloud.normals
+        dispersed = self._context.run(lambda: self._spread(fluid, positions, normals))
+        return ParticleReport(int(np.count_nonzero(~is_there)), placed, dispersed)
+
+    def positions(self) -> FloatArray:
+        """(M, 3) world space, of those that have not lost the surface."""
+        if self._state is None or self._fluid is None:
+            return np.zeros((0, 3), np.float32)
+        places, _ = self._context.run(self._state.read)
+        return (places[places[:, 3] > 0, :3] + self._fluid.anchor).astype(np.float32)
+
+    def _begin(self, arrays: FluidArrays, positions: FloatArray, normals: FloatArray) -> int:
+        return self._spread(arrays.upload(self._context), positions, normals)
+
+    def _carry(
+        self, state: ParticleState, before: FluidTextures, arrays: FluidArrays, seconds: float
+    ) -> tuple[FluidTextures, FloatArray, FloatArray]:
+        """The new fluid, and where the particles are on it."""
+        flowed, settled = ParticleState(self._context, state.count), ParticleState(self._context, state.count)
+        motion = {"seconds": seconds, "anchor_shift": tuple((before.anchor - arrays.anchor).tolist())}
+        self._draw("flow", before, state, flowed.places_alone, motion)
+        fluid = arrays.upload(self._context)
+        self._draw("settle", fluid, flowed, settled.framebuffer, {})
+        return fluid, *settled.read()
+
+    def _spread(self, fluid: FluidTextures, positions: FloatArray, normals: FloatArray) -> int:
+        """Spread particles over a fluid; how many changed their places."""
+        self._fluid, self._state, self._pressures = fluid, None, None
+        if not len(positions):
+            return 0
+        state = ParticleState.of(self._context, positions, normals)
+        if self._options.fills_gaps and self._options.steps:
+            company = self._crowd.press(state, self._reach, self._step).read_company()
+            self._reach = adapted_reach(float(np.mean(company, dtype=np.float64)), self._reach)
+        for _ in range(self._options.steps):
+            self._step += 1
+            pressures = self._crowd.press(state, self._reach, self._step)
+            state = self._spread_step(fluid, state, pressures)
+        self._state, self._pressures = state, self._crowd.press(state, self._reach, self._step)
+        return int(state.read()[1][:, 3].sum())
+
+    def _spread_step(self, fluid: FluidTextures, state: ParticleState, pressures: Pressures) -> ParticleState:
+        moved = ParticleState(self._context, state.count)
+        values = {
+            "reach": self._reach,
+            "push": PUSH,
+            "step_seed": _branch(self._options.seed, self._step),
+            "disperses": self._options.disperses,
+        }
+        self._draw("spread", fluid, state, moved.framebuffer, values, pressures.textures)
+        return moved
+
+    def _draw(
+        self,
+        name: str,
+        fluid: FluidTextures,
+        state: ParticleState,
+        target: moderngl.Framebuffer,
+        values: Mapping[str, object],
+        textures: Mapping[str, moderngl.Texture] | None = None,
+    ) -> None:
+        """Draw a fragment for each particle."""
+        step = Step(self._context, MotionPrograms(fluid.field.density_kernel).programs()[name])
+        step.set_uniforms({**fluid.uniforms, **state.uniforms, **values})
+        step.draw_plainly(target, {**fluid.textures, **state.textures, **(textures or {})})
+
+
+def _anchor(balls: Balls) -> Doubles:
+    """(3,): the middle of the balls; of single precision, so that positions count exactly from it."""
+    if not len(balls):
+        return np.zeros(3)
+    return np.mean(balls.bounds, axis=0).astype(np.float32).astype(np.float64)
+
+
+def _from_anchor(balls: Balls, anchor: Doubles) -> Balls:
+    """The balls with positions that count from the anchor."""
+    positions = (balls.positions.astype(np.float64) - anchor).astype(np.float32)
+    return Balls(positions, balls.radii, balls.weights, velocities=balls.velocities)
+
+
+def _branch(seed: int, number: int) -> int:
+    """The seed of a further use, as random_branch of lib/random.glsl."""
+    mask = 0xFFFFFFFF
+    value = (seed ^ number * 0x9E3779B9) & mask
+    value = ((value ^ value >> 16) * 0x7FEB352D) & mask
+    value = ((value ^ value >> 15) * 0x846CA68B) & mask
+    return value ^ value >> 16
