@@ -22,6 +22,7 @@ _FOLDERS = (
     "gpu_shaders.methods.equal_interval",
     "gpu_shaders.methods.vicinity",
     "gpu_shaders.methods.walking_depth_plane",
+    "gpu_shaders.methods.surface_particles",
     # What is no metaballs.
     "gpu_shaders.methods.glyphs",
     "addon.render.glyph_caster",

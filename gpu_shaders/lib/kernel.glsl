@@ -22,6 +22,16 @@ float kernel_derivative(float x) {
     return x <= 0.0 ? 0.0 : kernel_power(x) * (float(KERNEL_POWER) * KERNEL_LOW / x + float(KERNEL_POWER + 1) * KERNEL_HIGH);
 }
 
+float kernel_second_derivative(float x) {
+#if KERNEL_POWER == 1
+    return x <= 0.0 ? 0.0 : 2.0 * KERNEL_HIGH;
+#elif KERNEL_POWER == 2
+    return x <= 0.0 ? 0.0 : 2.0 * KERNEL_LOW + 6.0 * KERNEL_HIGH * x;
+#else
+    return x <= 0.0 ? 0.0 : x * x * (12.0 * KERNEL_LOW + 20.0 * KERNEL_HIGH * x);
+#endif
+}
+
 // The greatest |F''| along a chord, times R^2: of x^n it is 2 for n = 1, 8 a for 2, 6 a^2 for 3 and 8 a^3 for 4, where a is x
 // at the chord's middle.
 float kernel_slope_change(float a) {

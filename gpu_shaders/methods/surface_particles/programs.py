@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS, Kernel
+from ....addon.fluid.kernels import KERNELS, PolynomialKernel
+from ....addon.fluid.passes import DEPTH_BACKGROUND
+from ....addon.render.method import ATTRIBUTES, Attribute
 from ...kernel_constants import kernel_constants
 from ...programs import ROW_TEXTURE_WIDTH, ProgramSource
 
@@ -24,12 +27,48 @@ _COMMON: dict[str, object] = {"ROW_TEXTURE_WIDTH": ROW_TEXTURE_WIDTH, **_MOST}
 class MotionPrograms:
     """What moves particles on a fluid of one density kernel."""
 
-    kernel: Kernel
+    kernel: PolynomialKernel
 
     def programs(self) -> dict[str, ProgramSource]:
         """The programs by name."""
         kernel = kernel_constants(self.kernel)
-        return {name: _over_particles(name, **kernel) for name in ("flow", "settle", "spread")}
+        return {name: _over_particles(name, **kernel) for name in ("flow", "settle", "spread", "note")}
+
+
+@dataclass(frozen=True)
+class DrawPrograms:
+    """What draws particles.
+
+    Attributes
+    ----------
+    kernel
+        The density kernel.
+    with_starts
+        Whether a ray may start inside the fluid.
+    attributes
+        What is found beside depth and normal, in the order of ATTRIBUTES.
+    """
+
+    kernel: PolynomialKernel
+    with_starts: bool = False
+    attributes: tuple[Attribute, ...] = ()
+
+    def programs(self) -> dict[str, ProgramSource]:
+        """The programs by name."""
+        kernel, starts = kernel_constants(self.kernel), {"WITH_STARTS": int(self.with_starts)}
+        over_discs = {name: _over_discs(name, **starts) for name in ("front", "blend")}
+        screen = "lib/screen.vert"
+        programs = {**over_discs, "finish": _program("finish", screen, **kernel, **starts, **self._outputs())}
+        return {**programs, "start": _program("start", screen, **kernel)} if self.with_starts else programs
+
+    def _outputs(self) -> dict[str, object]:
+        return {
+            "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
+            "WITH_COLORS": int("color" in self.attributes),
+            "WITH_VELOCITIES": int("velocity" in self.attributes),
+            "WITH_BALLS": int("ball" in self.attributes),
+            **{f"{name.upper()}_LOCATION": location for location, name in enumerate(self.attributes, start=2)},
+        }
 
 
 def image_programs() -> dict[str, ProgramSource]:
@@ -49,8 +88,17 @@ def all_programs() -> Iterator[ProgramSource]:
     """Every program with every combination of constants that it may be compiled with."""
     yield from image_programs().values()
     yield from grid_programs().values()
+    subsets = [chosen for count in range(len(ATTRIBUTES) + 1) for chosen in combinations(ATTRIBUTES, count)]
     for kernel in KERNELS.values():
-        yield from MotionPrograms(kernel).programs().values()
+        if isinstance(kernel, PolynomialKernel):
+            yield from MotionPrograms(kernel).programs().values()
+            for with_starts, attributes in product((False, True), subsets):
+                yield from DrawPrograms(kernel, with_starts, attributes).programs().values()
+
+
+def _over_discs(name: str, **constants: object) -> ProgramSource:
+    """A rectangle for each particle."""
+    return _program(name, vertex=f"{FOLDER}/disc.vert", TIGHT_RECTANGLES=1, **constants)
 
 
 def _over_particles(name: str, **constants: object) -> ProgramSource:

@@ -23,7 +23,7 @@ from ...step import Step
 from .crowds import Crowd
 from .fluid import FluidArrays, FluidTextures
 from .programs import MotionPrograms
-from .state import FloatArray, ParticleState, Pressures
+from .state import Discs, FloatArray, ParticleState, Pressures
 
 Watch = Callable[[float], object]
 Doubles = npt.NDArray[np.float64]
@@ -70,7 +70,7 @@ class GpuSurfaceParticles:
         )
         self._fluid: FluidTextures | None = None
         self._state: ParticleState | None = None
-        self._pressures: Pressures | None = None
+        self._discs: Discs | None = None
         self._reach = 0.0
         self._step = 0
 
@@ -79,7 +79,7 @@ class GpuSurfaceParticles:
 
     def seed(self, balls: Balls, field: Field, *, threads: int = 0, watch: Watch = let_interrupt) -> ParticleReport:
         """Begin anew, see :meth:`surface_particles.SurfaceParticles.seed`; DeviceError also where the driver has too little."""
-        self._fluid = self._state = self._pressures = None  # their memory may be needed
+        self._fluid = self._state = self._discs = None  # their memory may be needed
         anchor = _anchor(balls)
         near = _from_anchor(balls, anchor)
         placed = self._native.seed(near, field, threads=threads, watch=watch).placed
@@ -112,6 +112,19 @@ class GpuSurfaceParticles:
         dispersed = self._context.run(lambda: self._spread(fluid, positions, normals))
         return ParticleReport(int(np.count_nonzero(~is_there)), placed, dispersed)
 
+    @property
+    def fluid(self) -> FluidTextures:
+        """What the particles are on; there are some."""
+        assert self._fluid is not None
+        return self._fluid
+
+    @property
+    def disc_textures(self) -> dict[str, moderngl.Texture]:
+        """What disc.vert reads; there are particles."""
+        assert self._state is not None
+        assert self._discs is not None
+        return {**self._state.textures, **self._discs.textures}
+
     def positions(self) -> FloatArray:
         """(M, 3) world space, of those that have not lost the surface."""
         if self._state is None or self._fluid is None:
@@ -135,7 +148,7 @@ class GpuSurfaceParticles:
 
     def _spread(self, fluid: FluidTextures, positions: FloatArray, normals: FloatArray) -> int:
         """Spread particles over a fluid; how many changed their places."""
-        self._fluid, self._state, self._pressures = fluid, None, None
+        self._fluid, self._state, self._discs = fluid, None, None
         if not len(positions):
             return 0
         state = ParticleState.of(self._context, positions, normals)
@@ -146,7 +159,7 @@ class GpuSurfaceParticles:
             self._step += 1
             pressures = self._crowd.press(state, self._reach, self._step)
             state = self._spread_step(fluid, state, pressures)
-        self._state, self._pressures = state, self._crowd.press(state, self._reach, self._step)
+        self._state, self._discs = state, self._noted(fluid, state)
         return int(state.read()[1][:, 3].sum())
 
     def _spread_step(self, fluid: FluidTextures, state: ParticleState, pressures: Pressures) -> ParticleState:
@@ -159,6 +172,13 @@ class GpuSurfaceParticles:
         }
         self._draw("spread", fluid, state, moved.framebuffer, values, pressures.textures)
         return moved
+
+    def _noted(self, fluid: FluidTextures, state: ParticleState) -> Discs:
+        """What the particles draw."""
+        discs = Discs(self._context, state.count)
+        company = self._crowd.press(state, self._reach, self._step).textures
+        self._draw("note", fluid, state, discs.framebuffer, {"reach": self._reach}, company)
+        return discs
 
     def _draw(
         self,

@@ -70,6 +70,19 @@ class ParticleState:
         return self._places.read(), self._normals.read()
 
 
+class Discs:
+    """What particles draw, see note.frag."""
+
+    def __init__(self, context: GpuContext, count: int) -> None:
+        self._along, self._across = ParticleTexture(context, count, 4), ParticleTexture(context, count, 4)
+        self.framebuffer: moderngl.Framebuffer = context.gl.framebuffer([self._along.texture, self._across.texture])
+
+    @property
+    def textures(self) -> dict[str, moderngl.Texture]:
+        """By sampler name."""
+        return {"bend_along_tx": self._along.texture, "bend_across_tx": self._across.texture}
+
+
 class Pressures:
     """What particles do to one another, see crowd.glsl."""
 

@@ -1,0 +1,41 @@
+"""What users can set of surface particles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .settings import Setting, Value
+
+COUNT = Setting("particles", "Particles", "How many surface particles there are at most", 16384, 1, 2**20)
+STEPS = Setting("steps", "Steps", "Steps of repulsion in each frame; more spread the particles more evenly", 10, 0, 100)
+CELL_SHARE = Setting(
+    "cell_share",
+    "Cell Size",
+    "Side of the spatial hash's cells as a share of a ball's diameter: smaller cells take more memory and time to fill, and less to read",
+    1 / 3,
+    0.1,
+    1.0,
+)
+DISPERSES = Setting("disperses", "Dispersion", "Let particles leave dense places for thin ones", True)
+FILLS_GAPS = Setting("fills_gaps", "Fill Gaps", "Put particles where there are none nearby, new droplets among these", True)
+FOLLOWS = Setting(
+    "follows",
+    "Follow Frames",
+    "Let particles go on from the frame before; else each frame begins anew, and is the same whatever was rendered before",
+    True,
+)
+EXACT = Setting(
+    "exact",
+    "Exact",
+    "Move what the discs show onto the surface in each pixel; else the picture is that of the discs alone, as they blend",
+    True,
+)
+
+PARTICLE_SETTINGS = (COUNT, STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS, FOLLOWS, EXACT)
+
+
+def simulation_options(settings: Mapping[str, Value]) -> dict[str, Any]:
+    """The arguments of :class:`surface_particles.SurfaceParticles`."""
+    names = (STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS)
+    return {"count": settings[COUNT.name], **{setting.name: settings[setting.name] for setting in names}}

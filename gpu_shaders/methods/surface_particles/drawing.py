@@ -1,0 +1,91 @@
+"""Particles to an image (section 7.6): the nearest discs, their blend, and the surface that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import moderngl
+import numpy as np
+
+from ....addon.fluid.camera import Camera
+from ....addon.render.method import Request
+from ...camera_parts import depth_scale
+from ...context import GpuContext
+from ...image_cells import plain
+from ...row_texture import row_texture
+from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
+from ...step import Step, Texture
+from ...surface_textures import SurfaceTextures
+from .programs import DrawPrograms
+from .simulation import GpuSurfaceParticles
+
+_CORNERS = 6
+"""Vertices of a disc's rectangle."""
+
+
+class Drawing:
+    """Draws the particles of a frame; made and used on the context's thread."""
+
+    def __init__(self, context: GpuContext, request: Request, particles: GpuSurfaceParticles, is_exact: bool) -> None:
+        self._context, self._particles, self._is_exact = context, particles, is_exact
+        self._attributes, self._box = request.known_attributes, request.balls.bounds
+        self._textures: dict[str, Texture] = {**particles.fluid.textures, **particles.disc_textures}
+        if "color" in self._attributes and request.balls.colors is not None:
+            colors = np.column_stack([request.balls.colors, np.ones(len(request.balls), np.float32)])
+            self._textures["color_tx"] = row_texture(context.gl, colors)
+
+    def draw(self, camera: Camera, output: SurfaceTextures) -> None:
+        """Draw what a camera sees."""
+        gl, fluid = self._context.gl, self._particles.fluid
+        # Where all influence spheres begin behind the near clip plane no ray can start in one.
+        with_starts = float(np.min(box_depths(self._box, camera))) <= camera.clip_start * (1 + 1e-6)
+        programs = DrawPrograms(fluid.field.polynomial_kernel, with_starts, self._attributes).programs()
+        steps = {name: Step(self._context, source) for name, source in programs.items()}
+        uniforms = {
+            **scene_camera_uniforms(self._box - fluid.anchor, fluid.anchor, camera),
+            **fluid.uniforms,
+            "particle_count": len(self._particles),
+            "depth_scale": _depth_scale(camera, self._box),
+            "is_exact": self._is_exact,
+        }
+        for step in steps.values():
+            step.set_uniforms(uniforms)
+        targets = _Targets(self._context, output.size)
+        read: dict[str, Texture] = {**self._textures, **targets.textures}
+        if with_starts:
+            steps["start"].draw_plainly(targets.inside, read)
+        targets.front.clear(depth=1.0)
+        self._over_discs(steps["front"], targets.front, moderngl.DEPTH_TEST, read)
+        targets.sums.clear()
+        gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._over_discs(steps["blend"], targets.sums, moderngl.BLEND, read)
+        steps["finish"].draw_plainly(output.framebuffer, read)
+
+    def _over_discs(self, step: Step, framebuffer: moderngl.Framebuffer, flags: int, textures: Mapping[str, Texture]) -> None:
+        gl = self._context.gl
+        gl.enable_only(flags)
+        gl.depth_func = "<"
+        step.draw(framebuffer, moderngl.TRIANGLES, _CORNERS * len(self._particles), textures)
+
+
+class _Targets:
+    """What is drawn into beside the surface, for one size of image."""
+
+    def __init__(self, context: GpuContext, size: tuple[int, int]) -> None:
+        gl = context.gl
+        front = context.depth_texture(size)
+        normals, ways, insides = (plain(gl.texture(size, components, dtype="f4")) for components in (4, 1, 1))
+        self.textures = {"front_tx": front, "normal_sum_tx": normals, "way_sum_tx": ways, "inside_tx": insides}
+        self.front = gl.framebuffer([], front)
+        self.sums = gl.framebuffer([normals, ways])
+        self.inside = gl.framebuffer([insides])
+
+
+def _depth_scale(camera: Camera, box: np.ndarray) -> float:
+    """Of distances from the anchor's plane."""
+    window = camera.window
+    slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
+    stretch = float(np.hypot.reduce([1.0, *slopes])) if camera.is_perspective else 1.0
+    farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
+    return depth_scale(max(farthest, 1e-30))

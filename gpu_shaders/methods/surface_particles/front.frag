@@ -1,0 +1,19 @@
+// How far the nearest disc of each pixel is (section 7.6, the depth pass).
+#include "lib/conservative_depth.glsl"
+#include "methods/surface_particles/disc.glsl"
+#include "methods/surface_particles/ray_start.glsl"
+
+uniform float depth_scale;
+
+flat in vec4 v_place;
+flat in vec4 v_normal;
+flat in vec4 v_along;
+flat in vec4 v_across;
+
+void main() {
+    Disc disc = disc_unpack(v_place, v_normal, v_along, v_across);
+    Meeting meeting = disc_meeting(disc, ray_from_pixel(gl_FragCoord.xy), starts_inside(ivec2(gl_FragCoord.xy)));
+    if (!meeting.is_met)
+        discard;
+    gl_FragDepth = clamp(meeting.t * depth_scale, 0.0, 1.0);
+}
