@@ -7,7 +7,14 @@ from typing import Any
 
 from .settings import Setting, Value
 
-COUNT = Setting("particles", "Particles", "How many surface particles there are at most", 16384, 1, 2**20)
+COUNT = Setting(
+    "particles",
+    "Particles",
+    "How many surface particles there are; 0 for as many as the surface asks for, about fifty for a lone ball",
+    0,
+    0,
+    2**20,
+)
 STEPS = Setting("steps", "Steps", "Steps of repulsion in each frame; more spread the particles more evenly", 10, 0, 100)
 CELL_SHARE = Setting(
     "cell_share",

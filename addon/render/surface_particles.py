@@ -27,8 +27,10 @@ class ParticleCloud:
         (M, 3) float32, world space: on the surface, and unit, out of the fluid.
     velocities
         (M, 3) float32, units a second: of the surface there, as far as balls have velocities.
+    scales
+        (M,) float32, Blender units: how large the balls are there, the mean of their influence radii.
     spacings
-        (M,) float32: the distance to its neighbours if they were spread evenly as densely as they are here.
+        (M,) float32, Blender units: the distance to its neighbours if they were spread evenly as densely as they are here.
     ids
         (M,) uint32: stays with a particle until that is placed anew.
     """
@@ -36,6 +38,7 @@ class ParticleCloud:
     positions: npt.NDArray[np.float32]
     normals: npt.NDArray[np.float32]
     velocities: npt.NDArray[np.float32]
+    scales: npt.NDArray[np.float32]
     spacings: npt.NDArray[np.float32]
     ids: npt.NDArray[np.uint32]
 
@@ -79,7 +82,7 @@ class SurfaceParticles:
     Parameters
     ----------
     count
-        How many there are at most.
+        How many there are at most, up to 16,777,216; 0 for as many as the surface asks for, about fifty for a lone ball.
     cell_share
         The side of the spatial hash's cells as a share of a ball's diameter, 0.05 to 1 (the paper: a third to a fifth).
     steps
@@ -101,7 +104,7 @@ class SurfaceParticles:
 
     def __init__(
         self,
-        count: int = 16384,
+        count: int = 0,
         *,
         cell_share: float = 1 / 3,
         steps: int = 4,
@@ -171,6 +174,7 @@ class SurfaceParticles:
         self,
         positions: npt.NDArray[np.float32],
         normals: npt.NDArray[np.float32],
+        scales: npt.NDArray[np.float32],
         *,
         reach: float,
         step: int,
@@ -182,18 +186,18 @@ class SurfaceParticles:
         Parameters
         ----------
         reach
-            How far particles push one another, Blender units.
+            How far particles push one another, in influence radii.
         step
             A number that differs from frame to frame, which the places depend on.
 
         Returns how many were placed; in the cloud they come last. The errors are those of `seed`.
         """
         with native.translated_errors():
-            return int(self._particles.refill(positions, normals, reach=reach, step=step, threads=threads, watch=watch))
+            return int(self._particles.refill(positions, normals, scales, reach=reach, step=step, threads=threads, watch=watch))
 
     @property
     def reach(self) -> float:
-        """How far particles push one another, Blender units."""
+        """How far particles push one another, in influence radii."""
         return float(self._particles.reach)
 
     def __len__(self) -> int:

@@ -19,7 +19,7 @@ void main() {
     Disc disc = disc_unpack(v_place, v_normal, v_along, v_across);
     Meeting meeting = disc_meeting(disc, ray_from_pixel(gl_FragCoord.xy), starts_inside(pixel));
     float behind = meeting.t - front_distance(pixel);
-    if (!meeting.is_met || behind > BLEND_BEHIND * disc.radius)
+    if (!meeting.is_met || behind < 0.0 || behind > BLEND_BEHIND * disc.radius)
         discard;
     out_normal_sum = meeting.weight * vec4(meeting.normal, 1.0);
     out_way_sum = meeting.weight * behind;

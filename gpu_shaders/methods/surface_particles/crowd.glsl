@@ -1,5 +1,23 @@
-// What particles do to one another within their reach (section 7.3.1).
+// What particles do to one another within their reach (section 7.3.1): two push one another where they are nearer than the lesser of
+// their reaches, h. They are looked for on the level of one of them, whose cells are as wide as the reach of the farthest, or the half
+// of that, or a quarter.
 #include "lib/random.glsl"
+
+uniform float reach;      // influence radii
+uniform float widest;     // the widest cell, a little more than the farthest reach, Blender units
+uniform int level_count;
+
+// Reaches may be rounded.
+const float LEVEL_SLACK = 1.0001;
+
+// The level of what reaches so far.
+int level_of(float own_reach) {
+    return int(clamp(log2(widest / (LEVEL_SLACK * own_reach)), 0.0, float(level_count - 1)));
+}
+
+float level_side(int level) {
+    return widest * exp2(-float(level));
+}
 
 // What the particles around a place do there.
 struct Pressure {
@@ -9,11 +27,11 @@ struct Pressure {
 };
 
 // Adds one of two particles that face the same way to the pressure on the other, whose number is `pushed`.
-void pressure_add(inout Pressure pressure, vec3 offset, vec3 normal, vec3 other_normal, float reach, int pushed) {
+void pressure_add(inout Pressure pressure, vec3 offset, vec3 normal, vec3 other_normal, float h, int pushed) {
     float squared = dot(offset, offset);
-    if (squared >= reach * reach || dot(normal, other_normal) <= 0.0)
+    if (squared >= h * h || dot(normal, other_normal) <= 0.0)
         return;
-    float way = sqrt(squared), share = 1.0 - way / reach;
+    float way = sqrt(squared), share = 1.0 - way / h;
     pressure.force += share * share * (way > 0.0 ? offset / way : random_direction(uint(pushed)));
     pressure.density += share * share * share;
     pressure.company += 1.0;

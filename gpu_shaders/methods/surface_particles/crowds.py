@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 import moderngl
@@ -19,7 +22,7 @@ from .state import ParticleState, Pressures
 _MOST_LAYERS = 24
 """Particles at one pixel that are told apart; those beyond are not pushed in this step, and in the next one the image is another."""
 
-_PIXELS_A_REACH = 5
+_PIXELS_A_CELL = 5
 """Of the image: more tell particles apart better, fewer are drawn faster."""
 
 _PIXELS_A_PARTICLE = 16
@@ -29,10 +32,45 @@ _LEAST_SIDE = 64
 """Of the image, in pixels; a particle's square has to fit in."""
 
 
+_SLACK = 1.0001
+"""How much wider the widest cell is than the farthest reach, which may be rounded."""
+
+
+@dataclass(frozen=True)
+class Reaches:
+    """How far particles push one another.
+
+    Attributes
+    ----------
+    share
+        In influence radii.
+    radii
+        The least and the greatest influence radius, Blender units.
+    """
+
+    share: float
+    radii: tuple[float, float]
+
+    @property
+    def levels(self) -> int:
+        """How many sizes of cells there are, each half as wide as the one before."""
+        least, greatest = self.radii
+        return 1 + int(math.log2(_SLACK * greatest / least))
+
+    def side(self, level: int) -> float:
+        """Of the cells of a level, Blender units."""
+        return float(_SLACK * self.share * self.radii[1] * 2.0**-level)
+
+    @property
+    def uniforms(self) -> dict[str, object]:
+        """What crowd.glsl asks of it."""
+        return {"reach": self.share, "widest": self.side(0), "level_count": self.levels}
+
+
 class Crowd(Protocol):
     """Finds out what particles do to one another."""
 
-    def press(self, state: ParticleState, reach: float, step: int) -> Pressures:
+    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
         """The pressure on each; `step` is a number that differs from step to step."""
         ...
 
@@ -50,22 +88,31 @@ class ImageCrowd:
         self._queries = OcclusionQueries(context)
         self._images: _CrowdImages | None = None
 
-    def press(self, state: ParticleState, reach: float, step: int) -> Pressures:
+    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
         """See :meth:`Crowd.press`."""
         gl, images = self._context.gl, self._images_for(state.count)
         pressures = Pressures(self._context, state.count)
         pressures.framebuffer.clear()
         uniforms = {
             **state.uniforms,
-            "reach": reach,
+            **reaches.uniforms,
             "image_axes": _image_axes(step),
-            "pixel_width": reach / _PIXELS_A_REACH,
             "image_side": images.side,
         }
-        for each in self._steps.values():
-            each.set_uniforms(uniforms)
+        self._set_uniforms(uniforms)
         gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
+        for level in range(reaches.levels):
+            self._set_uniforms({"level": level, "pixel_width": reaches.side(level) / _PIXELS_A_CELL})
+            self._press_level(state, images, pressures)
+        return pressures
+
+    def _set_uniforms(self, values: Mapping[str, object]) -> None:
+        for step in self._steps.values():
+            step.set_uniforms(values)
+
+    def _press_level(self, state: ParticleState, images: _CrowdImages, pressures: Pressures) -> None:
+        gl = self._context.gl
         for number, query in enumerate(self._queries.take(_MOST_LAYERS)):
             layer, before = images.layers[number % 2], images.layers[1 - number % 2]
             read = {**state.textures, "layer_tx": before.texture}
@@ -81,7 +128,6 @@ class ImageCrowd:
                 gl.enable_only(moderngl.BLEND)
                 self._steps["push"].draw(images.pushed, moderngl.TRIANGLES, 24 * state.count, read)
                 self._steps["collect"].draw_plainly(pressures.framebuffer, read)
-        return pressures
 
     def _images_for(self, count: int) -> _CrowdImages:
         side = max(_LEAST_SIDE, 1 << (int(np.ceil(np.sqrt(count * _PIXELS_A_PARTICLE))) - 1).bit_length())
@@ -127,7 +173,7 @@ class GridCrowd:
         self._steps = {name: ComputeStep(context, source) for name, source in grid_programs().items()}
         self._buffers: tuple[int, list[moderngl.Buffer]] | None = None
 
-    def press(self, state: ParticleState, reach: float, step: int) -> Pressures:
+    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
         """See :meth:`Crowd.press`."""
         pressures = Pressures(self._context, state.count)
         buckets = 1 << (state.count - 1).bit_length()
@@ -136,7 +182,7 @@ class GridCrowd:
             buffer.bind_to_storage_buffer(binding)
         pressures.bind_to_images()
         for name, each in self._steps.items():
-            each.set_uniforms({**state.uniforms, "reach": reach, "bucket_count": buckets})
+            each.set_uniforms({**state.uniforms, **reaches.uniforms, "bucket_count": buckets})
             each.use_textures(state.textures)
             threads = buckets if name in ("grid_allot", "grid_sort") else state.count
             each.run_in_lines(-(-threads // THREADS))

@@ -12,6 +12,7 @@ from ....addon.render.method import Request
 from ...camera_parts import depth_scale
 from ...context import GpuContext
 from ...image_cells import plain
+from ...occlusion import OcclusionQueries
 from ...row_texture import row_texture
 from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
 from ...step import Step, Texture
@@ -22,12 +23,18 @@ from .simulation import GpuSurfaceParticles
 _CORNERS = 6
 """Vertices of a disc's rectangle."""
 
+_ROUNDS = 8
+"""Sheets of discs that a ray looks at for the surface: discs reach a little beyond the edges of what they are on."""
+
+_NOWHERE = 3e38
+
 
 class Drawing:
     """Draws the particles of a frame; made and used on the context's thread."""
 
     def __init__(self, context: GpuContext, request: Request, particles: GpuSurfaceParticles, is_exact: bool) -> None:
         self._context, self._particles, self._is_exact = context, particles, is_exact
+        self._queries = OcclusionQueries(context)
         self._attributes, self._box = request.known_attributes, request.balls.bounds
         self._textures: dict[str, Texture] = {**particles.fluid.textures, **particles.disc_textures}
         if "color" in self._attributes and request.balls.colors is not None:
@@ -50,17 +57,21 @@ class Drawing:
         }
         for step in steps.values():
             step.set_uniforms(uniforms)
-        targets = _Targets(self._context, output.size)
-        read: dict[str, Texture] = {**self._textures, **targets.textures}
+        targets = _Targets(self._context, output)
         if with_starts:
-            steps["start"].draw_plainly(targets.inside, read)
-        targets.front.clear(depth=1.0)
-        self._over_discs(steps["front"], targets.front, moderngl.DEPTH_TEST, read)
-        targets.sums.clear()
+            steps["start"].draw_plainly(targets.inside, self._textures)
+        output.clear()
         gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         gl.blend_func = moderngl.ONE, moderngl.ONE
-        self._over_discs(steps["blend"], targets.sums, moderngl.BLEND, read)
-        steps["finish"].draw_plainly(output.framebuffer, read)
+        read: dict[str, Texture] = {**self._textures, **targets.textures}
+        for query in self._queries.take(_ROUNDS if self._is_exact else 1):
+            targets.front.clear(depth=1.0)
+            with query.asked():
+                self._over_discs(steps["front"], targets.front, moderngl.DEPTH_TEST, read)
+            targets.sums.clear()
+            with query.required():
+                self._over_discs(steps["blend"], targets.sums, moderngl.BLEND, read)
+                steps["finish"].draw_plainly(targets.found, read)
 
     def _over_discs(self, step: Step, framebuffer: moderngl.Framebuffer, flags: int, textures: Mapping[str, Texture]) -> None:
         gl = self._context.gl
@@ -72,14 +83,23 @@ class Drawing:
 class _Targets:
     """What is drawn into beside the surface, for one size of image."""
 
-    def __init__(self, context: GpuContext, size: tuple[int, int]) -> None:
-        gl = context.gl
+    def __init__(self, context: GpuContext, output: SurfaceTextures) -> None:
+        gl, size = context.gl, output.size
         front = context.depth_texture(size)
-        normals, ways, insides = (plain(gl.texture(size, components, dtype="f4")) for components in (4, 1, 1))
-        self.textures = {"front_tx": front, "normal_sum_tx": normals, "way_sum_tx": ways, "inside_tx": insides}
+        normals, ways, insides, beyond = (plain(gl.texture(size, components, dtype="f4")) for components in (4, 1, 1, 1))
+        self.textures = {
+            "front_tx": front,
+            "normal_sum_tx": normals,
+            "way_sum_tx": ways,
+            "inside_tx": insides,
+            "beyond_tx": beyond,
+        }
         self.front = gl.framebuffer([], front)
         self.sums = gl.framebuffer([normals, ways])
         self.inside = gl.framebuffer([insides])
+        self.found = gl.framebuffer([*output.textures.values(), beyond])
+        # Rays begin before all that there is.
+        gl.framebuffer([beyond]).clear(red=-_NOWHERE)
 
 
 def _depth_scale(camera: Camera, box: np.ndarray) -> float:

@@ -17,8 +17,12 @@ uniform sampler2D color_tx;
 const int FINISH_STEPS = 6;
 const float FINISH_LONGEST_STEP = 0.1;
 
+// How far beyond the middle of what was tried the next round begins, in influence radii.
+const float FINISH_BEYOND = 0.02;
+
 layout(location = 0) out float out_depth;
 layout(location = 1) out vec4 out_normal;
+layout(location = BEYOND_LOCATION) out float out_beyond;
 #if WITH_COLORS
 layout(location = COLOR_LOCATION) out vec4 out_color;
 #endif
@@ -33,22 +37,25 @@ struct Place {
     bool is_there;
     float t;
     vec3 normal;
+    float radius; // the least influence radius there
 };
 
 // Where a ray meets the surface near a distance.
 Place place_on(vec3 start, vec3 direction, float t, float side) {
+    float radius = 0.0;
     for (int i = 0; i < FINISH_STEPS; i++) {
         Sample found = fluid_sample(start + t * direction);
         float slope = length(found.gradient), rise = side * dot(found.gradient, direction);
+        radius = max(radius, found.radius);
         float missing = side * (isovalue - found.density);
         if (!(slope > 0.0))
             break;
         if (abs(missing) <= 1e-5 * slope * found.radius && rise > 0.0)
-            return Place(true, t, -found.gradient / slope);
+            return Place(true, t, -found.gradient / slope, radius);
         float longest = FINISH_LONGEST_STEP * found.radius;
         t += clamp(missing / max(rise, 0.05 * slope), -longest, longest);
     }
-    return Place(false, t, vec3(0.0));
+    return Place(false, t, vec3(0.0), radius);
 }
 
 // Weighted by the share of each ball in the density.
@@ -104,18 +111,28 @@ void put_nothing() {
 #endif
 }
 
+// Where a pixel's discs are on average, or where its ray meets the surface near there.
+Place place_of(ivec2 pixel, vec3 start, vec3 direction, float t) {
+    if (is_exact)
+        return place_on(start, direction, t, starts_inside(pixel) ? -1.0 : 1.0);
+    return Place(true, t, normalize(texelFetch(normal_sum_tx, pixel, 0).xyz), 0.0);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec4 normal_sum = texelFetch(normal_sum_tx, pixel, 0);
+    float weight = texelFetch(normal_sum_tx, pixel, 0).w;
+    // What an earlier round has found stays.
+    if (front_is_empty(pixel) || weight <= 0.0)
+        discard;
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
     vec3 start = scene_start(ray), direction = scene_direction(ray);
-    float t = front_distance(pixel) + texelFetch(way_sum_tx, pixel, 0).x / max(normal_sum.w, 1e-30);
-    Place place = Place(normal_sum.w > 0.0, t, normalize(normal_sum.xyz));
-    if (place.is_there && is_exact)
-        place = place_on(start, direction, t, starts_inside(pixel) ? -1.0 : 1.0);
+    float t = front_distance(pixel) + texelFetch(way_sum_tx, pixel, 0).x / weight;
+    Place place = place_of(pixel, start, direction, t);
     float depth = place.t / ray.stretch;
     put_nothing();
+    out_beyond = t + FINISH_BEYOND * place.radius;
     if (place.is_there && depth >= clip_depths.x && depth <= clip_depths.y) {
+        out_beyond = FRONT_DONE;
         out_depth = min(anchor_depth + depth, DEPTH_BACKGROUND);
         out_normal = vec4(place.normal, 0.0);
 #if WITH_COLORS || WITH_VELOCITIES || WITH_BALLS

@@ -18,15 +18,18 @@ struct Sample {
     float rate;    // how fast F changes because balls move
     vec3 velocity; // of the balls, weighted by the lengths of their gradients (equation 3)
     float radius;  // the least influence radius of the balls that reach the point, 0 where none does
+    float scale;   // the harmonic mean of their influence radii, weighted by the lengths of their gradients
 };
 
 struct SurfacePoint {
     bool is_there;
     vec3 position;
     vec3 normal;
+    float scale; // as that of the sample
 };
 
-void fluid_add_ball(inout Sample found, inout float lengths, vec3 point, int ball) {
+// `sums`: of the lengths of gradients, and of these by the influence radii.
+void fluid_add_ball(inout Sample found, inout vec2 sums, vec3 point, int ball) {
     vec4 sphere = hash_sphere(ball);
     vec3 offset = point - sphere.xyz;
     float x = 1.0 - dot(offset, offset) / (sphere.w * sphere.w);
@@ -40,23 +43,25 @@ void fluid_add_ball(inout Sample found, inout float lengths, vec3 point, int bal
     found.rate -= dot(slope, motion.xyz);
     found.velocity += slope_length * motion.xyz;
     found.radius = min(found.radius, sphere.w);
-    lengths += slope_length;
+    sums += slope_length * vec2(1.0, 1.0 / sphere.w);
 }
 
 Sample fluid_sample(vec3 point) {
-    Sample found = Sample(0.0, vec3(0.0), 0.0, vec3(0.0), FLUID_NO_RADIUS);
-    float lengths = 0.0;
+    Sample found = Sample(0.0, vec3(0.0), 0.0, vec3(0.0), FLUID_NO_RADIUS, 0.0);
+    vec2 sums = vec2(0.0);
     int levels = min(hash_levels(), MOST_LEVELS);
     for (int level = 0; level < levels; level++) {
         Bucket bucket = hash_find(level, point);
         for (uint entry = bucket.begin; entry < bucket.end; entry++) {
             int ball = hash_ball(entry, bucket);
             if (ball >= 0)
-                fluid_add_ball(found, lengths, point, ball);
+                fluid_add_ball(found, sums, point, ball);
         }
     }
-    if (lengths > 0.0)
-        found.velocity /= lengths;
+    if (sums.x > 0.0) {
+        found.velocity /= sums.x;
+        found.scale = sums.x / sums.y;
+    }
     if (found.radius == FLUID_NO_RADIUS)
         found.radius = 0.0;
     return found;
@@ -72,11 +77,11 @@ SurfacePoint fluid_projected(vec3 position) {
         float way = (isovalue - found.density) / slope;
         vec3 normal = -found.gradient / slope;
         if (abs(way) <= FLUID_NEAR * found.radius)
-            return SurfacePoint(true, position - way * normal, normal);
+            return SurfacePoint(true, position - way * normal, normal, found.scale);
         float longest = FLUID_LONGEST_PROJECTION * found.radius;
         position -= clamp(way, -longest, longest) * normal;
     }
-    return SurfacePoint(false, position, vec3(0.0));
+    return SurfacePoint(false, position, vec3(0.0), 0.0);
 }
 
 // The velocity of a point that stays on the surface and moves as desired where it may (equation 2, corrected: the desired velocity

@@ -30,11 +30,14 @@ class FluidArrays:
         Kernel and threshold.
     anchor
         (3,) float64, world space: where positions count from.
+    radii
+        The least and the greatest influence radius, Blender units.
     """
 
     rows: dict[str, Rows]
     field: Field
     anchor: npt.NDArray[np.float64]
+    radii: tuple[float, float]
 
     @classmethod
     def of(cls, balls: Balls, field: Field, levels: Sequence[HashLevel], anchor: npt.NDArray[np.float64]) -> FluidArrays:
@@ -47,7 +50,8 @@ class FluidArrays:
             "ball_tx": np.column_stack([balls.positions, balls.radii]).astype(np.float32),
             "motion_tx": np.column_stack([velocities, balls.weights]).astype(np.float32),
         }
-        return cls(rows, field, anchor)
+        radii = float(np.min(balls.radii, initial=np.inf)), float(np.max(balls.radii, initial=0.0))
+        return cls(rows, field, anchor, radii)
 
     def upload(self, context: GpuContext) -> FluidTextures:
         """On the context's thread; DeviceError where the balls are in more cells than a texture holds."""
@@ -62,7 +66,7 @@ class FluidArrays:
         levels = self.rows["level_tx"]
         textures["level_tx"] = context.gl.texture((len(levels), 1), 4, levels, dtype="u4")
         textures["level_tx"].filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return FluidTextures(textures, self.field, self.anchor)
+        return FluidTextures(textures, self.field, self.anchor, self.radii)
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class FluidTextures:
     textures: dict[str, moderngl.Texture]
     field: Field
     anchor: npt.NDArray[np.float64]
+
+    radii: tuple[float, float]
 
     @property
     def uniforms(self) -> dict[str, object]:

@@ -2,7 +2,7 @@
 // which lie far apart keep its resolution. What falls together is told apart by its place in space.
 
 uniform mat2x3 image_axes; // columns: unit, at right angles to each other
-uniform float pixel_width; // Blender units
+uniform float pixel_width; // Blender units; of the level
 uniform int image_side;    // pixels
 
 // The pixel of a place before folding.

@@ -7,5 +7,5 @@ void main() {
         return;
     vec4 place = particle_place(particle);
     if (place.w > 0.0)
-        atomicAdd(buckets[grid_bucket(grid_cell(place.xyz))].y, 1u);
+        atomicAdd(buckets[grid_bucket_of(place)].y, 1u);
 }

@@ -8,6 +8,6 @@ void main() {
     vec4 place = particle_place(particle);
     if (place.w <= 0.0)
         return;
-    uint bucket = grid_bucket(grid_cell(place.xyz));
+    uint bucket = grid_bucket_of(place);
     members[buckets[bucket].x + atomicAdd(buckets[bucket].y, 1u)] = uint(particle);
 }

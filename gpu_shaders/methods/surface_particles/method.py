@@ -22,8 +22,8 @@ class SurfaceParticlesMethod(PartedMethod[GpuSurfaceParticles]):
     """The method on one OpenGL context."""
 
     def __init__(self, context: GpuContext) -> None:
-        # Depth, normal and the attributes.
-        context.require(METHOD.gl_version, 2 + len(METHOD.attributes))
+        # Depth, normal, the attributes, and how far rays have come.
+        context.require(METHOD.gl_version, 3 + len(METHOD.attributes))
         super().__init__(context, METHOD)
         self._crowd = context.run(lambda: best_crowd(context))
 

@@ -3,7 +3,7 @@
 #include "methods/surface_particles/fluid.glsl"
 
 uniform sampler2D company_tx; // how many others are within reach
-uniform float reach;
+uniform float reach;          // influence radii
 
 // A disc's radius in distances of the even spread that there is around it, and in reaches at least: what fills gaps lets none be wider.
 const float DISC_SPACINGS = 1.2;
@@ -48,9 +48,10 @@ void main() {
     if (particle >= particle_count)
         discard;
     mat3 bend = bend_at(particle_place(particle).xyz, particle_normal(particle).xyz);
+    float own_reach = reach * particle_place(particle).w;
     float company = texelFetch(company_tx, particle_texel(particle), 0).x;
     // Of the hexagonal lattice that has so many points within the reach.
-    float spacing = reach * sqrt(TAU / (sqrt(3.0) * (company + 1.0)));
-    out_bend_along = vec4(bend[0][0], bend[1][1], bend[2][2], max(DISC_SPACINGS * spacing, DISC_LEAST * reach));
+    float spacing = own_reach * sqrt(TAU / (sqrt(3.0) * (company + 1.0)));
+    out_bend_along = vec4(bend[0][0], bend[1][1], bend[2][2], max(DISC_SPACINGS * spacing, DISC_LEAST * own_reach));
     out_bend_across = vec4(bend[0][1], bend[0][2], bend[1][2], 0.0);
 }

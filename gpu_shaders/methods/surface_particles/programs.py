@@ -64,6 +64,7 @@ class DrawPrograms:
     def _outputs(self) -> dict[str, object]:
         return {
             "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
+            "BEYOND_LOCATION": 2 + len(self.attributes),
             "WITH_COLORS": int("color" in self.attributes),
             "WITH_VELOCITIES": int("velocity" in self.attributes),
             "WITH_BALLS": int("ball" in self.attributes),

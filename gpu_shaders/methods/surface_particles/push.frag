@@ -3,10 +3,9 @@
 #include "methods/surface_particles/crowd.glsl"
 
 uniform usampler2D layer_tx;
-uniform float reach;
 
 flat in int v_particle;
-flat in vec3 v_position;
+flat in vec4 v_place;
 flat in vec3 v_normal;
 layout(location = 0) out vec4 out_pressure;
 layout(location = 1) out float out_company;
@@ -16,8 +15,9 @@ void main() {
     if (pushed < 0 || pushed == v_particle)
         discard;
     Pressure pressure = Pressure(vec3(0.0), 0.0, 0.0);
-    vec3 offset = particle_place(pushed).xyz - v_position;
-    pressure_add(pressure, offset, particle_normal(pushed).xyz, v_normal, reach, pushed);
+    vec4 place = particle_place(pushed);
+    float h = reach * min(place.w, v_place.w);
+    pressure_add(pressure, place.xyz - v_place.xyz, particle_normal(pushed).xyz, v_normal, h, pushed);
     if (pressure.company == 0.0)
         discard;
     out_pressure = vec4(pressure.force, pressure.density);

@@ -3,11 +3,12 @@
 #include "lib/triangles.glsl"
 #include "methods/surface_particles/state.glsl"
 #include "methods/surface_particles/folded.glsl"
+#include "methods/surface_particles/crowd.glsl"
 
-uniform float reach;
+uniform int level;
 
 flat out int v_particle;
-flat out vec3 v_position;
+flat out vec4 v_place;
 flat out vec3 v_normal;
 
 const int SQUARES = 4, CORNERS = 6;
@@ -16,11 +17,11 @@ void main() {
     v_particle = gl_VertexID / (SQUARES * CORNERS);
     int copy = gl_VertexID / CORNERS % SQUARES;
     vec4 place = particle_place(v_particle);
-    v_position = place.xyz;
+    v_place = place;
     v_normal = particle_normal(v_particle).xyz;
-    ivec2 middle = folded_pixel(v_position);
-    // Of pixels' corners; rounding may move a particle to the pixel beside its own.
-    int span = int(reach / pixel_width) + 2;
+    ivec2 middle = folded_pixel(place.xyz);
+    // None of the level reaches farther; rounding may move a particle to the pixel beside its own.
+    int span = int(min(reach * place.w, level_side(level)) / pixel_width) + 2;
     ivec2 low = folded(middle - span);
     low -= image_side * (ivec2(copy & 1, copy >> 1) * ivec2(greaterThan(low + 2 * span + 1, ivec2(image_side))));
     bool is_own = copy == 0 || any(lessThan(low, ivec2(0)));

@@ -12,6 +12,6 @@ void main() {
     vec4 place = particle_place(particle);
     SurfacePoint point = fluid_projected(place.xyz);
     bool is_there = point.is_there && place.w > 0.0;
-    out_place = vec4(point.position, is_there ? 1.0 : 0.0);
+    out_place = vec4(point.position, is_there ? point.scale : 0.0);
     out_normal = vec4(point.normal, 0.0);
 }

@@ -17,10 +17,10 @@ import numpy.typing as npt
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.field import Field
 from ....addon.render.native import let_interrupt
-from ....addon.render.surface_particles import ParticleReport, SurfaceParticles, adapted_reach
+from ....addon.render.surface_particles import ParticleCloud, ParticleReport, SurfaceParticles, adapted_reach
 from ...context import GpuContext
 from ...step import Step
-from .crowds import Crowd
+from .crowds import Crowd, Reaches
 from .fluid import FluidArrays, FluidTextures
 from .programs import MotionPrograms
 from .state import Discs, FloatArray, ParticleState, Pressures
@@ -86,7 +86,7 @@ class GpuSurfaceParticles:
         self._reach, self._step = self._native.reach, 0
         arrays = FluidArrays.of(near, field, self._native.hash(), anchor)
         cloud = self._native.cloud
-        dispersed = self._context.run(lambda: self._begin(arrays, cloud.positions, cloud.normals))
+        dispersed = self._context.run(lambda: self._spread(arrays.upload(self._context), cloud))
         return ParticleReport(0, placed, dispersed)
 
     def follow(
@@ -102,14 +102,11 @@ class GpuSurfaceParticles:
         arrays = FluidArrays.of(near, field, self._native.hash(), anchor)
         fluid, places, normals = self._context.run(lambda: self._carry(state, before, arrays, seconds))
         is_there = places[:, 3] > 0
-        positions, normals = np.ascontiguousarray(places[is_there, :3]), np.ascontiguousarray(normals[is_there, :3])
-        placed = 0
-        if self._options.fills_gaps:
-            self._step += 1
-            given = {"reach": self._reach, "step": self._step}
-            placed = self._native.refill(positions, normals, **given, threads=threads, watch=watch)
-            positions, normals = self._native.cloud.positions, self._native.cloud.normals
-        dispersed = self._context.run(lambda: self._spread(fluid, positions, normals))
+        kept = (np.ascontiguousarray(rows[is_there]) for rows in (places[:, :3], normals[:, :3], places[:, 3]))
+        self._step += self._options.fills_gaps
+        placed = self._native.refill(*kept, reach=self._reach, step=self._step, threads=threads, watch=watch)
+        cloud = self._native.cloud
+        dispersed = self._context.run(lambda: self._spread(fluid, cloud))
         return ParticleReport(int(np.count_nonzero(~is_there)), placed, dispersed)
 
     @property
@@ -132,9 +129,6 @@ class GpuSurfaceParticles:
         places, _ = self._context.run(self._state.read)
         return (places[places[:, 3] > 0, :3] + self._fluid.anchor).astype(np.float32)
 
-    def _begin(self, arrays: FluidArrays, positions: FloatArray, normals: FloatArray) -> int:
-        return self._spread(arrays.upload(self._context), positions, normals)
-
     def _carry(
         self, state: ParticleState, before: FluidTextures, arrays: FluidArrays, seconds: float
     ) -> tuple[FluidTextures, FloatArray, FloatArray]:
@@ -146,18 +140,18 @@ class GpuSurfaceParticles:
         self._draw("settle", fluid, flowed, settled.framebuffer, {})
         return fluid, *settled.read()
 
-    def _spread(self, fluid: FluidTextures, positions: FloatArray, normals: FloatArray) -> int:
+    def _spread(self, fluid: FluidTextures, cloud: ParticleCloud) -> int:
         """Spread particles over a fluid; how many changed their places."""
         self._fluid, self._state, self._discs = fluid, None, None
-        if not len(positions):
+        if not len(cloud.positions):
             return 0
-        state = ParticleState.of(self._context, positions, normals)
-        if self._options.fills_gaps and self._options.steps:
-            company = self._crowd.press(state, self._reach, self._step).read_company()
+        state = ParticleState.of(self._context, cloud)
+        if self._options.fills_gaps and self._options.steps and self._options.count:
+            company = self._press(fluid, state).read_company()
             self._reach = adapted_reach(float(np.mean(company, dtype=np.float64)), self._reach)
         for _ in range(self._options.steps):
             self._step += 1
-            pressures = self._crowd.press(state, self._reach, self._step)
+            pressures = self._press(fluid, state)
             state = self._spread_step(fluid, state, pressures)
         self._state, self._discs = state, self._noted(fluid, state)
         return int(state.read()[1][:, 3].sum())
@@ -173,10 +167,13 @@ class GpuSurfaceParticles:
         self._draw("spread", fluid, state, moved.framebuffer, values, pressures.textures)
         return moved
 
+    def _press(self, fluid: FluidTextures, state: ParticleState) -> Pressures:
+        return self._crowd.press(state, Reaches(self._reach, fluid.radii), self._step)
+
     def _noted(self, fluid: FluidTextures, state: ParticleState) -> Discs:
         """What the particles draw."""
         discs = Discs(self._context, state.count)
-        company = self._crowd.press(state, self._reach, self._step).textures
+        company = self._press(fluid, state).textures
         self._draw("note", fluid, state, discs.framebuffer, {"reach": self._reach}, company)
         return discs
 
@@ -196,10 +193,11 @@ class GpuSurfaceParticles:
 
 
 def _anchor(balls: Balls) -> Doubles:
-    """(3,): the middle of the balls; of single precision, so that positions count exactly from it."""
+    """(3,): amidst the balls, near the smallest: there single precision has to be finest."""
     if not len(balls):
         return np.zeros(3)
-    return np.mean(balls.bounds, axis=0).astype(np.float32).astype(np.float64)
+    weights = (float(np.min(balls.radii)) / balls.radii.astype(np.float64)) ** 4
+    return np.asarray(weights @ balls.positions / np.sum(weights), np.float64)
 
 
 def _from_anchor(balls: Balls, anchor: Doubles) -> Balls:

@@ -5,7 +5,7 @@
 #include "methods/surface_particles/motion.glsl"
 
 uniform sampler2D pressure_tx; // force, density
-uniform float reach;           // how far particles push one another
+uniform float reach;           // how far particles push one another, in influence radii
 uniform float push;            // how far pressure moves a particle, in reaches
 uniform uint step_seed;
 uniform bool disperses;
@@ -34,14 +34,16 @@ vec3 rim_of(int other, int particle) {
     vec3 direction = random_direction(random_branch(step_seed, uint(particle)));
     vec3 tangent = direction - dot(direction, normal) * normal;
     float span = length(tangent);
-    return particle_place(other).xyz + reach * (span > 0.0 ? tangent / span : tangent);
+    vec4 place = particle_place(other);
+    return place.xyz + reach * place.w * (span > 0.0 ? tangent / span : tangent);
 }
 
 // Where others push it in a step in time that is as long as its feedback (equations 2 and 8).
-vec3 pushed(int particle, vec3 position) {
-    Sample found = fluid_sample(position);
-    vec3 desired = motion_within(push * reach * texelFetch(pressure_tx, particle_texel(particle), 0).xyz, reach);
-    return position + motion_within(fluid_constrained(found, desired, 0.0, 1.0), found.radius);
+vec3 pushed(int particle, vec4 place) {
+    Sample found = fluid_sample(place.xyz);
+    float own_reach = reach * place.w;
+    vec3 desired = motion_within(push * own_reach * texelFetch(pressure_tx, particle_texel(particle), 0).xyz, own_reach);
+    return place.xyz + motion_within(fluid_constrained(found, desired, 0.0, 1.0), found.radius);
 }
 
 void main() {
@@ -49,7 +51,7 @@ void main() {
     if (particle >= particle_count)
         discard;
     vec4 place = particle_place(particle), normal = particle_normal(particle);
-    SurfacePoint point = SurfacePoint(false, place.xyz, vec3(0.0));
+    SurfacePoint point = SurfacePoint(false, place.xyz, vec3(0.0), 0.0);
     float dispersed = normal.w;
     int other = thinner(particle);
     if (other >= 0) {
@@ -57,7 +59,7 @@ void main() {
         dispersed += point.is_there ? 1.0 : 0.0;
     }
     if (!point.is_there)
-        point = fluid_projected(pushed(particle, place.xyz));
-    out_place = vec4(point.position, point.is_there && place.w > 0.0 ? 1.0 : 0.0);
+        point = fluid_projected(pushed(particle, place));
+    out_place = vec4(point.position, point.is_there && place.w > 0.0 ? point.scale : 0.0);
     out_normal = vec4(point.normal, dispersed);
 }

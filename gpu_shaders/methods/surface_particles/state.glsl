@@ -1,6 +1,6 @@
 // Surface particles, one texel each.
 
-uniform sampler2D place_tx;  // from the anchor; then 1, or 0 for a particle that has lost the surface
+uniform sampler2D place_tx;  // from the anchor; then the mean influence radius of the balls there, 0 for a particle that has lost the surface
 uniform sampler2D normal_tx; // unit, out of the fluid; then how often it left a dense place in this frame
 uniform int particle_count;
 

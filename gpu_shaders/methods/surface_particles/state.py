@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from ....addon.render.surface_particles import ParticleCloud
 from ...context import GpuContext
 from ...image_cells import plain
 from ...programs import ROW_TEXTURE_WIDTH
@@ -48,10 +49,11 @@ class ParticleState:
         self.places_alone: moderngl.Framebuffer = context.gl.framebuffer([self._places.texture])
 
     @classmethod
-    def of(cls, context: GpuContext, positions: FloatArray, normals: FloatArray) -> ParticleState:
-        """Particles at (M, 3) from the anchor, with unit normals (M, 3)."""
+    def of(cls, context: GpuContext, cloud: ParticleCloud) -> ParticleState:
+        """Particles whose positions count from the anchor."""
+        positions, normals = cloud.positions, cloud.normals
         state = cls(context, len(positions))
-        state._places.write(np.column_stack([positions, np.ones(len(positions), np.float32)]))
+        state._places.write(np.column_stack([positions, cloud.scales]))
         state._normals.write(np.column_stack([normals, np.zeros(len(normals), np.float32)]))
         return state
 

@@ -13,7 +13,8 @@ use crate::run::{python_error, run};
 
 type Vectors<'py> = Bound<'py, PyArray2<f32>>;
 type HashLevel<'py> = (f64, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray2<u32>>);
-type Arrays<'py> = (Vectors<'py>, Vectors<'py>, Vectors<'py>, Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>);
+type Numbers<'py> = Bound<'py, PyArray1<f32>>;
+type Arrays<'py> = (Vectors<'py>, Vectors<'py>, Vectors<'py>, Numbers<'py>, Numbers<'py>, Bound<'py, PyArray1<u32>>);
 
 /// Points that live on the surface of a fluid and move with it (van Kooten, van den Bergen and Telea 2007).
 #[pyclass(frozen)]
@@ -113,14 +114,15 @@ impl SurfaceParticles {
 
     /// Takes particles that are on the present balls in place of its own, and fills the gaps between them.
     ///
-    /// positions and normals float32 (M, 3). Returns how many were placed; these are behind the others.
-    #[pyo3(signature = (positions, normals, *, reach, step, threads=0, watch=None))]
+    /// positions and normals float32 (M, 3), scales float32 (M,). Returns how many were placed; these are behind the others.
+    #[pyo3(signature = (positions, normals, scales, *, reach, step, threads=0, watch=None))]
     #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
     fn refill(
         &self,
         python: Python<'_>,
         positions: &Bound<'_, PyAny>,
         normals: &Bound<'_, PyAny>,
+        scales: &Bound<'_, PyAny>,
         reach: f64,
         step: u32,
         threads: usize,
@@ -128,17 +130,19 @@ impl SurfaceParticles {
     ) -> PyResult<usize> {
         let positions = Rows::<f32, 3>::borrow("positions", positions)?;
         let normals = Rows::<f32, 3>::borrow("normals", normals)?;
-        let (positions, normals) = (positions.rows(), normals.rows());
+        let scales = Rows::<f32, 1>::borrow("scales", scales)?;
+        let (positions, normals, scales) = (positions.rows(), normals.rows(), scales.rows());
         run(python, threads, watch, |job| {
-            let places = positions
-                .iter()
-                .zip(normals)
-                .map(|(position, normal)| SurfacePoint { position: position.map(f64::from), normal: normal.map(f64::from) });
+            let places = positions.iter().zip(normals).zip(scales).map(|((position, normal), [scale])| SurfacePoint {
+                position: position.map(f64::from),
+                normal: normal.map(f64::from),
+                scale: f64::from(*scale),
+            });
             self.locked().refill(places, reach, step, job)
         })
     }
 
-    /// How far particles push one another.
+    /// How far particles push one another, in influence radii.
     #[getter]
     fn reach(&self) -> f64 {
         self.locked().reach()
@@ -155,7 +159,7 @@ impl SurfaceParticles {
         self.locked().particles().len()
     }
 
-    /// The particles: positions, normals and velocities float32 (M, 3), spacings float32 (M,), ids uint32 (M,).
+    /// The particles: positions, normals and velocities float32 (M, 3), scales and spacings float32 (M,), ids uint32 (M,).
     fn arrays<'py>(&self, python: Python<'py>) -> PyResult<Arrays<'py>> {
         let particles = self.locked();
         let particles = particles.particles();
@@ -163,12 +167,14 @@ impl SurfaceParticles {
             let numbers: Vec<f32> = particles.iter().flat_map(of).collect();
             numbers.into_pyarray(python).reshape([particles.len(), 3])
         };
+        let scales: Vec<f32> = particles.iter().map(|particle| particle.scale).collect();
         let spacings: Vec<f32> = particles.iter().map(|particle| particle.spacing).collect();
         let ids: Vec<u32> = particles.iter().map(|particle| particle.id).collect();
         Ok((
             vectors(|particle| particle.position)?,
             vectors(|particle| particle.normal)?,
             vectors(|particle| particle.velocity)?,
+            scales.into_pyarray(python),
             spacings.into_pyarray(python),
             ids.into_pyarray(python),
         ))

@@ -30,6 +30,8 @@ pub struct Sample {
     pub velocity: [f64; 3],
     /// The least influence radius of the balls that reach the point, 0 where none does.
     pub radius: f64,
+    /// The harmonic mean of their influence radii, weighted by the lengths of their gradients: how large things are there.
+    pub scale: f64,
 }
 
 /// A point of the surface.
@@ -39,6 +41,8 @@ pub struct SurfacePoint {
     pub position: [f64; 3],
     /// Unit, out of the fluid.
     pub normal: [f64; 3],
+    /// See [`Sample::scale`].
+    pub scale: f64,
 }
 
 /// Moving balls, and which of them reach a point.
@@ -118,7 +122,7 @@ impl Fluid {
     /// The density at a point and what it changes with.
     pub fn sample(&self, point: [f64; 3]) -> Sample {
         let mut sample = Sample { radius: f64::INFINITY, ..Sample::default() };
-        let (mut velocity, mut weights) = ([0.0; 3], 0.0);
+        let (mut velocity, mut lengths, mut curvatures) = ([0.0; 3], 0.0, 0.0);
         self.hash.for_near(point, |ball| {
             let radius = f64::from(self.radii[ball]);
             let offset = difference(point, double(self.centers[ball]));
@@ -131,16 +135,18 @@ impl Fluid {
             sample.density += weight * self.field.kernel.value(x);
             sample.gradient = plus(sample.gradient, 1.0, slope);
             sample.radius = sample.radius.min(radius);
+            let length = dot(slope, slope).sqrt();
+            lengths += length;
+            curvatures += length / radius;
             if let Some(velocities) = &self.velocities {
                 let own = double(velocities[ball]);
-                let length = dot(slope, slope).sqrt();
                 sample.rate -= dot(slope, own);
                 velocity = plus(velocity, length, own);
-                weights += length;
             }
         });
-        if weights > 0.0 {
-            sample.velocity = velocity.map(|c| c / weights);
+        if lengths > 0.0 {
+            sample.velocity = velocity.map(|c| c / lengths);
+            sample.scale = lengths / curvatures;
         }
         if sample.radius == f64::INFINITY {
             sample.radius = 0.0;
@@ -160,7 +166,7 @@ impl Fluid {
             }
             if distance.abs() <= NEAR * sample.radius {
                 let normal = sample.gradient.map(|c| -c / slope);
-                return Some(SurfacePoint { position: plus(position, -distance, normal), normal });
+                return Some(SurfacePoint { position: plus(position, -distance, normal), normal, scale: sample.scale });
             }
             let longest = LONGEST_PROJECTION * sample.radius;
             position = plus(position, distance.clamp(-longest, longest) / slope, sample.gradient);

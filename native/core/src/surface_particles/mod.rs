@@ -8,6 +8,7 @@
 mod crowd;
 mod fluid;
 mod hash;
+mod levels;
 mod probes;
 mod scatter;
 #[cfg(test)]
@@ -28,7 +29,7 @@ pub use self::fluid::SurfacePoint;
 use self::fluid::{Fluid, Sample};
 pub use self::hash::{Entry, Level};
 use self::probes::{exposed_area, probes};
-use self::scatter::{apart, scattered};
+use self::scatter::{apart, evenly, scattered};
 
 /// Particles at most.
 pub const MOST: usize = 1 << 24;
@@ -55,6 +56,13 @@ const DISPERSING: u32 = 8;
 /// d becomes d - 1, which is less than before where d > 1/2.
 const DISPERSION_THRESHOLD: f64 = 0.5;
 
+/// The distance between neighbours where their number is left to the surface, in influence radii: a lone ball of Wyvill's kernel has
+/// fifty then, and hardly a pixel is not covered.
+const FREE_SPACING: f64 = 0.35;
+
+/// Where as many are left to the surface, those are taken away that are this many times too many.
+const TOO_DENSE: f64 = 1.15;
+
 /// What has no particle within so many reaches gets one; the widest gap of an even spread is a quarter.
 const GAP: f64 = 0.6;
 
@@ -70,7 +78,7 @@ const PROBES_A_PARTICLE: f64 = 6.0;
 /// How the particles behave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How many there are at most, up to `MOST`.
+    /// How many there are at most, up to `MOST`; 0 for as many as the surface asks for.
     pub count: usize,
     /// The side of the spatial hash's cells as a share of a ball's diameter (the paper: a third to a fifth).
     pub cell_share: f64,
@@ -86,7 +94,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { count: 16384, cell_share: 1.0 / 3.0, steps: 4, disperses: true, fills_gaps: true, seed: 0 }
+        Self { count: 0, cell_share: 1.0 / 3.0, steps: 4, disperses: true, fills_gaps: true, seed: 0 }
     }
 }
 
@@ -110,6 +118,8 @@ pub struct Particle {
     pub normal: [f32; 3],
     /// Of the surface there, units a second.
     pub velocity: [f32; 3],
+    /// How large the balls are there: the mean of their influence radii.
+    pub scale: f32,
     /// The distance to its neighbours if they were spread evenly as densely as they are here.
     pub spacing: f32,
     /// Stays with it until it is placed anew.
@@ -122,7 +132,7 @@ pub struct SurfaceParticles {
     options: Options,
     fluid: Option<Fluid>,
     particles: Vec<Particle>,
-    /// h.
+    /// h, in influence radii.
     reach: f64,
     next_id: u32,
     step: u32,
@@ -134,8 +144,8 @@ impl SurfaceParticles {
     /// # Errors
     /// `InvalidInput` where an option is out of its range.
     pub fn new(options: Options) -> Result<Self> {
-        if !(1..=MOST).contains(&options.count) {
-            return Err(Error::InvalidInput(format!("there can be 1 to {MOST} surface particles, not {}", options.count)));
+        if options.count > MOST {
+            return Err(Error::InvalidInput(format!("there can be at most {MOST} surface particles, not {}", options.count)));
         }
         if !(0.05..=1.0).contains(&options.cell_share) {
             return Err(Error::InvalidInput(format!("the cell size must be 0.05 to 1 diameters, not {}", options.cell_share)));
@@ -181,7 +191,7 @@ impl SurfaceParticles {
         job: &Job,
     ) -> Result<Report> {
         let fluid = self.started(balls, velocities, field)?;
-        let points = points.iter().take(self.options.count);
+        let points = points.iter().take(self.most());
         let places: Vec<SurfacePoint> = points.filter_map(|point| fluid.projected(double(*point))).collect();
         let area = exposed_area(&fluid, self.options.seed);
         if area > 0.0 {
@@ -268,12 +278,12 @@ impl SurfaceParticles {
         self.particles.clear();
         let places: Vec<SurfacePoint> = places.collect();
         self.add(&places)?;
-        let placed = self.fill_gaps(&fluid, job)?;
+        let placed = if self.options.fills_gaps { self.fill_gaps(&fluid, job)? } else { 0 };
         self.fluid = Some(fluid);
         Ok(placed)
     }
 
-    /// h, how far particles push one another.
+    /// h, how far particles push one another, in influence radii.
     pub fn reach(&self) -> f64 {
         self.reach
     }
@@ -286,9 +296,18 @@ impl SurfaceParticles {
         before - self.particles.len()
     }
 
-    /// Places for particles on a surface that has none; `area` is that of the surface or more.
+    /// Particles at most.
+    fn most(&self) -> usize {
+        if self.options.count == 0 { MOST } else { self.options.count }
+    }
+
+    /// Places for particles on a surface that has none; `area` is that of the surface or more, in squares of influence radii.
     fn first_points(&mut self, fluid: &Fluid, area: f64, job: &Job) -> Result<Vec<SurfacePoint>> {
         let seed = branch(self.options.seed, self.step);
+        if self.options.count == 0 {
+            self.reach = REACH * FREE_SPACING;
+            return evenly(&probes(fluid, PROBE_SPACING * FREE_SPACING, mixed(seed), job)?, FREE_SPACING, MOST, seed);
+        }
         let spacing = (area / (PROBES_A_PARTICLE * self.options.count as f64)).sqrt();
         let points = probes(fluid, spacing, mixed(seed), job)?;
         let (chosen, distance) = scattered(&points, &[], self.options.count, even_distance(area, self.options.count), seed)?;
@@ -301,27 +320,33 @@ impl SurfaceParticles {
         self.step = self.step.wrapping_add(1);
         let points = probes(fluid, PROBE_SPACING * self.reach, branch(self.options.seed, self.step), job)?;
         let crowd = self.crowd()?;
-        let is_bare =
-            |point: &&SurfacePoint| crowd.pressure(point.position, point.normal, None).nearest > (GAP * self.reach).powi(2);
+        let is_bare = |point: &&SurfacePoint| crowd.pressure(point, None).nearest > GAP;
         let bare: Vec<SurfacePoint> = points.par_iter().filter(is_bare).copied().collect();
-        let chosen = apart(&bare, GAP_SPACING * self.reach, self.options.count)?;
-        let spare = self.options.count - self.particles.len();
-        if chosen.len() > spare {
-            self.remove_densest(&crowd, chosen.len() - spare)?;
+        let chosen = apart(&bare, GAP_SPACING * self.reach, self.most())?;
+        let surplus = self.surplus(&crowd)?.max((chosen.len() + self.particles.len()).saturating_sub(self.most()));
+        if surplus > 0 {
+            self.remove_densest(&crowd, surplus)?;
         }
         self.add(&chosen)?;
         Ok(chosen.len() + self.place_spare(&points)?)
     }
 
+    /// How many particles are too many for the surface, where it says how many there are.
+    fn surplus(&self, crowd: &Crowd) -> Result<usize> {
+        if self.options.count > 0 || self.particles.is_empty() {
+            return Ok(0);
+        }
+        let excess = (mean_count(&self.pressures(crowd)?) + 1.0) / even_count(REACH);
+        Ok(if excess > TOO_DENSE { (self.particles.len() as f64 * (1.0 - 1.0 / excess)) as usize } else { 0 })
+    }
+
     /// Puts particles that have no place between the others. How many.
     fn place_spare(&mut self, points: &[SurfacePoint]) -> Result<usize> {
-        let spare = self.options.count - self.particles.len();
+        let spare = self.options.count.saturating_sub(self.particles.len());
         if spare == 0 {
             return Ok(0);
         }
-        let mut taken = memory::with_capacity(self.particles.len())?;
-        let place = |particle: &Particle| SurfacePoint { position: double(particle.position), normal: double(particle.normal) };
-        taken.extend(self.particles.iter().map(place));
+        let taken = self.places()?;
         let (chosen, _) = scattered(points, &taken, spare, GAP_SPACING * self.reach, branch(self.options.seed, self.step))?;
         self.add(&chosen)?;
         Ok(chosen.len())
@@ -345,8 +370,8 @@ impl SurfaceParticles {
         for point in points {
             let id = self.next_id;
             self.next_id = id.wrapping_add(1);
-            let (position, normal) = (single(point.position), single(point.normal));
-            self.particles.push(Particle { position, normal, velocity: [0.0; 3], spacing: 0.0, id });
+            let (position, normal, scale) = (single(point.position), single(point.normal), point.scale as f32);
+            self.particles.push(Particle { position, normal, velocity: [0.0; 3], scale, spacing: 0.0, id });
         }
         Ok(())
     }
@@ -354,7 +379,7 @@ impl SurfaceParticles {
     /// Spreads the particles, and notes what they show.
     fn finish_frame(&mut self, fluid: Fluid, mut report: Report, job: &Job) -> Result<Report> {
         job.expect(self.options.steps);
-        if self.options.fills_gaps && self.options.steps > 0 {
+        if self.options.fills_gaps && self.options.steps > 0 && self.options.count > 0 {
             self.adapt_reach()?;
         }
         for _ in 0..self.options.steps {
@@ -367,7 +392,7 @@ impl SurfaceParticles {
             self.particles.par_iter_mut().zip(&pressures).for_each(|(particle, pressure)| {
                 let sample = fluid.sample(double(particle.position));
                 particle.velocity = single(sample.constrained(sample.velocity, fluid.field().isovalue, 0.0));
-                particle.spacing = even_spacing(pressure.count as f64 + 1.0, reach) as f32;
+                particle.spacing = even_spacing(pressure.count as f64 + 1.0, reach) as f32 * particle.scale;
             });
         }
         self.fluid = Some(fluid);
@@ -385,10 +410,10 @@ impl SurfaceParticles {
         let moved = self.particles.par_iter().enumerate().map(|(index, particle)| {
             let target = if self.options.disperses { thinner(step, index, &pressures) } else { None };
             if let Some(target) = target {
-                let (position, normal) = (double(self.particles[target].position), double(self.particles[target].normal));
+                let other = place(&self.particles[target]);
                 let direction = any_direction(branch(step, index as u32));
-                let tangent = unit(plus(direction, -dot(direction, normal), normal));
-                if let Some(moved) = on(fluid, *particle, plus(position, reach, tangent)) {
+                let tangent = unit(plus(direction, -dot(direction, other.normal), other.normal));
+                if let Some(moved) = on(fluid, *particle, plus(other.position, reach * other.scale, tangent)) {
                     return (Some(moved), true);
                 }
             }
@@ -412,30 +437,40 @@ impl SurfaceParticles {
     fn adapt_reach(&mut self) -> Result<()> {
         if !self.particles.is_empty() {
             let pressures = self.pressures(&self.crowd()?)?;
-            let others: usize = pressures.iter().map(|pressure| pressure.count).sum();
-            self.reach = adapted_reach(others as f64 / pressures.len() as f64, self.reach);
+            self.reach = adapted_reach(mean_count(&pressures), self.reach);
         }
         Ok(())
     }
 
     fn crowd(&self) -> Result<Crowd> {
-        let [positions, normals] = self.places()?;
-        Crowd::new(&positions, &normals, self.reach)
+        Crowd::new(&self.places()?, self.reach)
     }
 
     fn pressures(&self, crowd: &Crowd) -> Result<Vec<Pressure>> {
-        let [positions, normals] = self.places()?;
-        crowd.pressures(&positions, &normals)
+        crowd.pressures(&self.places()?)
     }
 
-    /// Positions and normals.
-    fn places(&self) -> Result<[Vec<[f32; 3]>; 2]> {
-        let mut positions = memory::with_capacity(self.particles.len())?;
-        positions.extend(self.particles.iter().map(|particle| particle.position));
-        let mut normals = memory::with_capacity(self.particles.len())?;
-        normals.extend(self.particles.iter().map(|particle| particle.normal));
-        Ok([positions, normals])
+    /// Where the particles are.
+    fn places(&self) -> Result<Vec<SurfacePoint>> {
+        let mut places = memory::with_capacity(self.particles.len())?;
+        places.extend(self.particles.iter().map(place));
+        Ok(places)
     }
+}
+
+/// Where a particle is.
+fn place(particle: &Particle) -> SurfacePoint {
+    SurfacePoint { position: double(particle.position), normal: double(particle.normal), scale: f64::from(particle.scale) }
+}
+
+/// How many others a particle has within its reach, on average.
+fn mean_count(pressures: &[Pressure]) -> f64 {
+    pressures.iter().map(|pressure| pressure.count as f64).sum::<f64>() / pressures.len() as f64
+}
+
+/// Points of a hexagonal lattice within a circle, whose radius is given in distances between neighbours.
+fn even_count(radius: f64) -> f64 {
+    2.0 * std::f64::consts::PI / 3f64.sqrt() * radius * radius
 }
 
 /// The reach that an even spread of as many particles over as much surface would have, or nearer to it; `company` is how many
@@ -458,6 +493,7 @@ fn thinner(step: u32, index: usize, pressures: &[Pressure]) -> Option<usize> {
 fn pushed(fluid: &Fluid, particle: &Particle, pressure: &Pressure, reach: f64) -> [f64; 3] {
     let position = double(particle.position);
     let sample = Sample { rate: 0.0, ..fluid.sample(position) };
+    let reach = reach * f64::from(particle.scale);
     let desired = within(pressure.force.map(|c| PUSH * reach * c), reach);
     plus(position, 1.0, within(sample.constrained(desired, fluid.field().isovalue, 1.0), sample.radius))
 }
@@ -465,7 +501,8 @@ fn pushed(fluid: &Fluid, particle: &Particle, pressure: &Pressure, reach: f64) -
 /// The particle moved onto the surface near a point.
 fn on(fluid: &Fluid, particle: Particle, point: [f64; 3]) -> Option<Particle> {
     let place = fluid.projected(point)?;
-    Some(Particle { position: single(place.position), normal: single(place.normal), ..particle })
+    let (position, normal, scale) = (single(place.position), single(place.normal), place.scale as f32);
+    Some(Particle { position, normal, scale, ..particle })
 }
 
 /// A motion that is not too long for a length.
@@ -477,7 +514,7 @@ fn within(motion: [f64; 3], length: f64) -> [f64; 3] {
 
 /// The distance between neighbours of a hexagonal lattice that has so many points within a circle.
 fn even_spacing(count: f64, radius: f64) -> f64 {
-    radius * (2.0 * std::f64::consts::PI / (3f64.sqrt() * count)).sqrt()
+    radius * (even_count(1.0) / count).sqrt()
 }
 
 /// The distance between neighbours of a hexagonal lattice of so many points on so much surface.

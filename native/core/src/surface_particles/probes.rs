@@ -28,7 +28,7 @@ const STEPS: usize = 6;
 /// How often the stretch where it leaves the fluid is halved.
 const HALVINGS: usize = 6;
 
-/// Finds points of the surface that are about `spacing` apart on the surface of each ball.
+/// Finds points of the surface that are about `spacing` influence radii apart on the surface of each ball.
 ///
 /// # Errors
 /// `OutOfMemory`, `Cancelled`.
@@ -50,12 +50,13 @@ pub fn probes(fluid: &Fluid, spacing: f64, seed: u32, job: &Job) -> Result<Vec<S
     Ok(points)
 }
 
-/// An area that is that of the surface or more: of each ball's surface what is exposed, which others may expose too.
+/// How large the surface is, or larger, in squares of the influence radii of the balls that it is of: of each ball's surface what is
+/// exposed, which others may expose too.
 pub fn exposed_area(fluid: &Fluid, seed: u32) -> f64 {
     let kernels_hold = !fluid.carves();
     let of_ball = |ball: usize| {
         let rays = Rays::of(fluid, ball, kernels_hold, branch(seed, ball as u32));
-        rays.leaving(FEWEST).map(|(_, distance)| 2.0 * TAU * distance * distance / FEWEST as f64).sum::<f64>()
+        rays.leaving(FEWEST).map(|(_, distance)| 2.0 * TAU * (distance / rays.radius).powi(2) / FEWEST as f64).sum::<f64>()
     };
     let of_part = |part: usize| (part * PART..((part + 1) * PART).min(fluid.len())).map(of_ball).sum::<f64>();
     // Summed in one order, whatever threads do.
@@ -66,7 +67,7 @@ pub fn exposed_area(fluid: &Fluid, seed: u32) -> f64 {
 /// Adds the points around a ball. Where a few directions find nothing, it lies deep within the fluid, or has none of it.
 fn of_ball(rays: &Rays<'_>, spacing: f64, points: &mut Vec<SurfacePoint>) -> Result<()> {
     let before = points.len();
-    let wanted = (2.0 * TAU * (rays.radius / spacing).powi(2)).min(MOST as f64) as usize;
+    let wanted = (2.0 * TAU / (spacing * spacing)).min(MOST as f64) as usize;
     for count in [FEWEST, wanted] {
         memory::reserve(points, count)?;
         points.extend(rays.leaving(count).map(|(point, _)| point));

@@ -1,11 +1,12 @@
-//! Chooses points of many so that they are spread evenly.
+//! Chooses points of many so that they are spread evenly. Distances are in influence radii, of the lesser of two points.
 
 use crate::error::Result;
 use crate::memory;
-use crate::tracing::random::{branch, mixed};
+use crate::tracing::random::branch;
 use crate::vectors::{difference, dot};
 
 use super::fluid::SurfacePoint;
+use super::levels::{LevelCell, Levels, present};
 
 /// The next distance as a share of the one before.
 const NEARER: f64 = 0.9;
@@ -38,7 +39,7 @@ pub fn scattered(
     let mut rest = shuffled(points, seed)?;
     let mut chosen = memory::with_capacity(count.min(points.len()))?;
     for _ in 0..MOST_TIMES {
-        let mut room = Room::new(distance, taken.len() + count)?;
+        let mut room = Room::new(distance, points.iter().chain(taken), taken.len() + count)?;
         taken.iter().chain(&chosen).for_each(|point| room.take(point));
         rest.retain(|point| {
             let is_chosen = chosen.len() < count && room.has(point);
@@ -56,12 +57,20 @@ pub fn scattered(
     Ok((chosen, EVEN * distance))
 }
 
+/// Points in random order, `count` at most, whose neighbours are about as far apart as in an even spread of that distance.
+///
+/// # Errors
+/// `OutOfMemory`.
+pub fn evenly(points: &[SurfacePoint], distance: f64, count: usize, seed: u32) -> Result<Vec<SurfacePoint>> {
+    apart(&shuffled(points, seed)?, distance / EVEN, count)
+}
+
 /// Points, `count` at most, of which no two are nearer than `distance`.
 ///
 /// # Errors
 /// `OutOfMemory`.
 pub fn apart(points: &[SurfacePoint], distance: f64, count: usize) -> Result<Vec<SurfacePoint>> {
-    let mut room = Room::new(distance, count.min(points.len()))?;
+    let mut room = Room::new(distance, points.iter(), count.min(points.len()))?;
     let mut chosen = memory::with_capacity(count.min(points.len()))?;
     for point in points {
         if chosen.len() < count && room.has(point) {
@@ -84,32 +93,37 @@ fn shuffled(points: &[SurfacePoint], seed: u32) -> Result<Vec<SurfacePoint>> {
 
 /// Which places are taken, in cells that are linked lists.
 struct Room {
+    /// Influence radii.
     distance: f64,
+    levels: Levels,
+    present: Vec<u32>,
     first: Vec<u32>,
-    taken: Vec<(SurfacePoint, u32)>,
+    taken: Vec<(SurfacePoint, LevelCell, u32)>,
 }
 
 impl Room {
-    fn new(distance: f64, count: usize) -> Result<Self> {
+    /// Room for so many of some points.
+    fn new<'a>(distance: f64, points: impl Iterator<Item = &'a SurfacePoint> + Clone, count: usize) -> Result<Self> {
+        let levels = Levels::new(distance * points.clone().map(|point| point.scale).fold(f64::MIN_POSITIVE, f64::max));
+        let present = present(points.map(|point| levels.level(distance * point.scale)))?;
         let first = memory::filled(NONE, count.max(1).next_power_of_two())?;
-        Ok(Self { distance, first, taken: memory::with_capacity(count)? })
+        Ok(Self { distance, levels, present, first, taken: memory::with_capacity(count)? })
     }
 
     /// Whether no place near this one is taken on a surface that faces the same way.
     fn has(&self, point: &SurfacePoint) -> bool {
-        let [x, y, z] = self.cell(point);
-        (0..27i64).all(|step| {
-            let cell = [x.wrapping_add(step / 9 - 1), y.wrapping_add(step / 3 % 3 - 1), z.wrapping_add(step % 3 - 1)];
-            self.is_free(cell, point)
-        })
+        let mut is_free = true;
+        self.levels.for_around(&self.present, point.position, |cell| is_free = is_free && self.is_free(cell, point));
+        is_free
     }
 
-    fn is_free(&self, cell: [i64; 3], point: &SurfacePoint) -> bool {
-        let mut index = self.first[self.bucket(cell)];
+    fn is_free(&self, cell: LevelCell, point: &SurfacePoint) -> bool {
+        let mut index = self.first[cell.bucket(self.first.len())];
         while index != NONE {
-            let (other, next) = &self.taken[index as usize];
+            let (other, place, next) = &self.taken[index as usize];
             let offset = difference(point.position, other.position);
-            if dot(offset, offset) < self.distance * self.distance && dot(point.normal, other.normal) > 0.0 {
+            let distance = self.distance * point.scale.min(other.scale);
+            if *place == cell && dot(offset, offset) < distance * distance && dot(point.normal, other.normal) > 0.0 {
                 return false;
             }
             index = *next;
@@ -119,16 +133,9 @@ impl Room {
 
     /// Takes a place; there is memory for as many as were announced.
     fn take(&mut self, point: &SurfacePoint) {
-        let bucket = self.bucket(self.cell(point));
+        let cell = self.levels.cell(self.levels.level(self.distance * point.scale), point.position);
+        let bucket = cell.bucket(self.first.len());
         let next = std::mem::replace(&mut self.first[bucket], self.taken.len() as u32);
-        self.taken.push((*point, next));
-    }
-
-    fn cell(&self, point: &SurfacePoint) -> [i64; 3] {
-        point.position.map(|coordinate| (coordinate / self.distance).floor() as i64)
-    }
-
-    fn bucket(&self, [x, y, z]: [i64; 3]) -> usize {
-        mixed(mixed(mixed(x as u32) ^ y as u32) ^ z as u32) as usize & (self.first.len() - 1)
+        self.taken.push((*point, cell, next));
     }
 }

@@ -50,7 +50,7 @@ fn a_lone_ball_is_covered_evenly() {
         assert!(variation(&distances) < if steps < 4 { 0.15 } else { 0.1 });
         assert!(distances.iter().all(|distance| *distance > 0.55 * even));
         // Measured before the steps, where random places have more neighbours than even ones.
-        assert!(steps == 0 || (found.reach / (REACH * even) - 1.0).abs() < 0.04, "{}", found.reach / even);
+        assert!(steps == 0 || (2.0 * found.reach / (REACH * even) - 1.0).abs() < 0.04, "{}", found.reach / even);
     }
 }
 
@@ -112,8 +112,8 @@ fn liquid_that_appears_gets_particles_at_once_and_what_vanishes_gives_its_own_ba
     let balls = Balls::new(&positions, &radii, &weights).unwrap();
     let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
     assert_eq!(particles.particles().len(), 600);
-    // A quarter of the surface of one of the others.
-    assert!((50..80).contains(&near(&particles, -9.0)), "{} {report:?}", near(&particles, -9.0));
+    // As many as each of the others: a smaller ball has them nearer together.
+    assert!((185..230).contains(&near(&particles, -9.0)), "{} {report:?}", near(&particles, -9.0));
     let balls = Balls::new(&positions[..1], &radii[..1], &weights[..1]).unwrap();
     let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
     assert!(report.lost > 290);
