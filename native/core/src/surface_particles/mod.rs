@@ -73,7 +73,7 @@ const GAP_SPACING: f64 = 0.4;
 const PROBE_SPACING: f64 = 0.3;
 
 /// Probes for each particle from which the first are chosen.
-const PROBES_A_PARTICLE: f64 = 6.0;
+const PROBES_A_PARTICLE: f64 = 4.0;
 
 /// How the particles behave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -306,10 +306,11 @@ impl SurfaceParticles {
         let seed = branch(self.options.seed, self.step);
         if self.options.count == 0 {
             self.reach = REACH * FREE_SPACING;
-            return evenly(&probes(fluid, PROBE_SPACING * FREE_SPACING, mixed(seed), job)?, FREE_SPACING, MOST, seed);
+            let points = probes(fluid, FREE_SPACING / PROBES_A_PARTICLE.sqrt(), |_| true, mixed(seed), job)?;
+            return evenly(&points, FREE_SPACING, MOST, seed);
         }
         let spacing = (area / (PROBES_A_PARTICLE * self.options.count as f64)).sqrt();
-        let points = probes(fluid, spacing, mixed(seed), job)?;
+        let points = probes(fluid, spacing, |_| true, mixed(seed), job)?;
         let (chosen, distance) = scattered(&points, &[], self.options.count, even_distance(area, self.options.count), seed)?;
         self.reach = REACH * distance;
         Ok(chosen)
@@ -318,10 +319,12 @@ impl SurfaceParticles {
     /// Puts particles where there is none nearby, and takes them from the densest places where there are no others. How many.
     fn fill_gaps(&mut self, fluid: &Fluid, job: &Job) -> Result<usize> {
         self.step = self.step.wrapping_add(1);
-        let points = probes(fluid, PROBE_SPACING * self.reach, branch(self.options.seed, self.step), job)?;
         let crowd = self.crowd()?;
-        let is_bare = |point: &&SurfacePoint| crowd.pressure(point, None).nearest > GAP;
-        let bare: Vec<SurfacePoint> = points.par_iter().filter(is_bare).copied().collect();
+        let is_bare = |point: &SurfacePoint| crowd.pressure(point, None).nearest > GAP;
+        let seed = branch(self.options.seed, self.step);
+        let has_spare = self.options.count > self.particles.len();
+        let points = probes(fluid, PROBE_SPACING * self.reach, |point| has_spare || is_bare(point), seed, job)?;
+        let bare: Vec<SurfacePoint> = points.par_iter().filter(|point| is_bare(point)).copied().collect();
         let chosen = apart(&bare, GAP_SPACING * self.reach, self.most())?;
         let surplus = self.surplus(&crowd)?.max((chosen.len() + self.particles.len()).saturating_sub(self.most()));
         if surplus > 0 {

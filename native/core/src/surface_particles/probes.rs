@@ -1,5 +1,5 @@
-//! Points all over the surface, found from the balls alone: where rays from a ball's centre leave the fluid for the last time
-//! within its influence sphere. Every part of the surface has balls that reach it, so none is missed, whoever looks from where.
+//! Points all over the surface, found from the balls alone: where rays from a ball's centre leave the fluid, each is moved onto the
+//! surface from the ball's kernel sphere. Every part of the surface has balls that reach it, so none is missed, whoever looks from where.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::job::Job;
 use crate::memory;
 use crate::tracing::random::{any_direction, branch};
-use crate::vectors::{along, plus};
+use crate::vectors::{along, difference, dot, plus};
 
 use super::fluid::{Fluid, SurfacePoint};
 
@@ -22,24 +22,28 @@ const MOST: usize = 1 << 16;
 /// Balls that a thread takes at a time.
 const PART: usize = 64;
 
-/// Where a ray is looked at between the kernel sphere and the influence sphere.
-const STEPS: usize = 6;
+/// Where rays begin that are to be moved onto the surface, in influence radii, where a ball has no kernel sphere.
+const MIDDLE: f64 = 0.5;
 
-/// How often the stretch where it leaves the fluid is halved.
-const HALVINGS: usize = 6;
-
-/// Finds points of the surface that are about `spacing` influence radii apart on the surface of each ball.
+/// Finds points of the surface that are about `spacing` influence radii apart on the surface of each ball. Of balls of which no point
+/// of a few is one to `look_at` there are only these.
 ///
 /// # Errors
 /// `OutOfMemory`, `Cancelled`.
-pub fn probes(fluid: &Fluid, spacing: f64, seed: u32, job: &Job) -> Result<Vec<SurfacePoint>> {
+pub fn probes(
+    fluid: &Fluid,
+    spacing: f64,
+    look_at: impl Fn(&SurfacePoint) -> bool + Sync,
+    seed: u32,
+    job: &Job,
+) -> Result<Vec<SurfacePoint>> {
     let kernels_hold = !fluid.carves();
     let parts = fluid.len().div_ceil(PART);
     job.expect(parts);
     let of_part = |part: usize| {
         let mut points = Vec::new();
         for ball in part * PART..((part + 1) * PART).min(fluid.len()) {
-            of_ball(&Rays::of(fluid, ball, kernels_hold, branch(seed, ball as u32)), spacing, &mut points)?;
+            of_ball(&Rays::of(fluid, ball, kernels_hold, branch(seed, ball as u32)), spacing, &look_at, &mut points)?;
         }
         job.advance(1)?;
         Ok(points)
@@ -65,13 +69,18 @@ pub fn exposed_area(fluid: &Fluid, seed: u32) -> f64 {
 }
 
 /// Adds the points around a ball. Where a few directions find nothing, it lies deep within the fluid, or has none of it.
-fn of_ball(rays: &Rays<'_>, spacing: f64, points: &mut Vec<SurfacePoint>) -> Result<()> {
+fn of_ball(
+    rays: &Rays<'_>,
+    spacing: f64,
+    look_at: &impl Fn(&SurfacePoint) -> bool,
+    points: &mut Vec<SurfacePoint>,
+) -> Result<()> {
     let before = points.len();
     let wanted = (2.0 * TAU / (spacing * spacing)).min(MOST as f64) as usize;
     for count in [FEWEST, wanted] {
         memory::reserve(points, count)?;
         points.extend(rays.leaving(count).map(|(point, _)| point));
-        if points.len() == before || wanted <= FEWEST {
+        if wanted <= FEWEST || !points[before..].iter().any(look_at) {
             break;
         }
     }
@@ -83,8 +92,8 @@ struct Rays<'a> {
     fluid: &'a Fluid,
     center: [f64; 3],
     radius: f64,
-    /// Up to here they are in the fluid.
-    kernel_radius: f64,
+    /// Where they are moved onto the surface from.
+    begin: f64,
     pole: [f64; 3],
 }
 
@@ -92,8 +101,9 @@ impl<'a> Rays<'a> {
     /// `kernels_hold` says that no ball takes density away.
     fn of(fluid: &'a Fluid, ball: usize, kernels_hold: bool, seed: u32) -> Self {
         let (center, radius, weight) = fluid.ball(ball);
-        let kernel_radius = if kernels_hold { radius * fluid.field().kernel_radius_share(weight) } else { 0.0 };
-        Self { fluid, center, radius, kernel_radius, pole: any_direction(seed) }
+        let share = if kernels_hold { fluid.field().kernel_radius_share(weight) } else { 0.0 };
+        let begin = radius * if share > 0.0 { share } else { MIDDLE };
+        Self { fluid, center, radius, begin, pole: any_direction(seed) }
     }
 
     /// The points where so many rays leave the fluid, and how far they are from the centre.
@@ -101,21 +111,15 @@ impl<'a> Rays<'a> {
         (0..count).filter_map(move |index| self.leaving_along(along(self.pole, fibonacci(index, count))))
     }
 
-    /// Where a ray leaves the fluid for the last time before the end of the influence sphere.
+    /// Where a ray leaves the fluid, if it is outside at the end of the influence sphere.
     fn leaving_along(&self, direction: [f64; 3]) -> Option<(SurfacePoint, f64)> {
-        let is_inside = |distance: f64| self.fluid.is_inside(plus(self.center, distance, direction));
-        if is_inside(self.radius) {
+        if self.fluid.is_inside(plus(self.center, self.radius, direction)) {
             return None;
         }
-        let step = (self.radius - self.kernel_radius) / STEPS as f64;
-        let mut inside = (1..=STEPS).map(|count| self.radius - count as f64 * step).find(|distance| is_inside(*distance))?;
-        let mut outside = inside + step;
-        for _ in 0..HALVINGS {
-            let middle = (inside + outside) / 2.0;
-            *(if is_inside(middle) { &mut inside } else { &mut outside }) = middle;
-        }
-        let distance = (inside + outside) / 2.0;
-        Some((self.fluid.projected(plus(self.center, distance, direction))?, distance))
+        let point = self.fluid.projected(plus(self.center, self.begin, direction))?;
+        let offset = difference(point.position, self.center);
+        let squared = dot(offset, offset);
+        (squared <= self.radius * self.radius).then(|| (point, squared.sqrt()))
     }
 }
 

@@ -112,11 +112,15 @@ fn liquid_that_appears_gets_particles_at_once_and_what_vanishes_gives_its_own_ba
     let balls = Balls::new(&positions, &radii, &weights).unwrap();
     let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
     assert_eq!(particles.particles().len(), 600);
-    // As many as each of the others: a smaller ball has them nearer together.
-    assert!((185..230).contains(&near(&particles, -9.0)), "{} {report:?}", near(&particles, -9.0));
+    // At once about as densely as those that are there, and soon as many as each of the others: a smaller ball has them nearer together.
+    assert!((185..300).contains(&near(&particles, -9.0)), "{} {report:?}", near(&particles, -9.0));
+    for _ in 0..10 {
+        particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
+    }
+    assert!(near(&particles, -9.0).abs_diff(200) < 15, "{}", near(&particles, -9.0));
     let balls = Balls::new(&positions[..1], &radii[..1], &weights[..1]).unwrap();
     let report = particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
-    assert!(report.lost > 290);
+    assert!(report.lost > 380);
     particles.follow(&balls, None, field(0.2), 0.04, &Job::default()).unwrap();
     assert_eq!(particles.particles().len(), 600);
     assert!(variation(&nearest(particles.particles())) < 0.2);
