@@ -52,6 +52,10 @@ class PartedMethod(ABC, Generic[Scene]):
         """What there is to count of what is drawn."""
         return {}
 
+    def notes_of(self, scene: Scene) -> tuple[str, ...]:
+        """What users should know of what is drawn, in sentences."""
+        return ()
+
     def forget(self) -> None:
         """Give back what is kept, after an error: the driver may have refused the memory."""
 
@@ -77,6 +81,7 @@ class PartedMethod(ABC, Generic[Scene]):
                     request.watch(region.y_min / request.camera.height)
                     self._run(partial(self._fill_part, request, scene, region, surface))
             surface.counts |= self.counts_of(scene)
+            surface.notes = self.notes_of(scene)
         return surface
 
     def find_surface_on_device(self, request: Request) -> SurfaceTextures:
@@ -90,6 +95,7 @@ class PartedMethod(ABC, Generic[Scene]):
         textures.milliseconds |= milliseconds
         if scene is not None:
             textures.counts |= self.counts_of(scene)
+            textures.notes = self.notes_of(scene)
         return textures
 
     def _run(self, work: Callable[[], Result]) -> Result:

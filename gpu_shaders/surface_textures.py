@@ -49,7 +49,7 @@ class SurfaceTextures:
     textures
         "depth" has one channel, vectors have four, of which the last says nothing, "ball" has whole numbers: see
         :class:`method.Surface`. Empty after the release.
-    milliseconds, counts
+    milliseconds, counts, notes
         As in :class:`method.Surface`.
     """
 
@@ -63,6 +63,7 @@ class SurfaceTextures:
         self._framebuffer: moderngl.Framebuffer | None = None
         self.milliseconds: dict[str, float] = {}
         self.counts: dict[str, int] = {}
+        self.notes: tuple[str, ...] = ()
         self._context = context
         self._get_attachment = context.function("glGetFramebufferAttachmentParameteriv", *[ctypes.c_uint] * 3, ctypes.c_void_p)
         self._get_error = context.function("glGetError", result=ctypes.c_uint)

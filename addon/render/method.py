@@ -120,6 +120,8 @@ class Surface:
         (height, width) int32: index of the ball with the greatest share, -1 where there is nothing; None where not asked for.
     milliseconds, counts
         Wall time by stage in order, and what happened, by name.
+    notes
+        Sentences on what users should know of it.
     """
 
     depth: npt.NDArray[np.float32]
@@ -129,6 +131,7 @@ class Surface:
     ball: npt.NDArray[np.int32] | None = None
     milliseconds: dict[str, float] = dataclasses.field(default_factory=dict)
     counts: dict[str, int] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def background(cls, camera: Camera, attributes: Collection[Attribute] = ()) -> Surface:
@@ -198,13 +201,14 @@ class DeviceSurface(Protocol):
     ----------
     size
         Width and height, pixels.
-    milliseconds, counts
+    milliseconds, counts, notes
         As in :class:`Surface`.
     """
 
     size: tuple[int, int]
     milliseconds: dict[str, float]
     counts: dict[str, int]
+    notes: tuple[str, ...]
 
     @property
     def passes(self) -> tuple[str, ...]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from ..fluid.balls import Balls
 from ..fluid.field import Field
 from . import native
+from .method import Request
+from .particle_settings import FOLLOWS
 from .surface_particles import ParticleReport
 
 LONGEST_STEP = 0.25
@@ -17,10 +20,17 @@ _CUT = 0.5
 """Where a larger share of the particles lose the surface, it is another fluid."""
 
 
+TOO_SPARSE = 2.0
+"""Influence radii: where particles reach farther, a lone ball has seven or fewer."""
+
+
 class FollowingParticles(Protocol):
     """Surface particles, on whatever processor; see :class:`surface_particles.SurfaceParticles`."""
 
     def __len__(self) -> int: ...
+
+    @property
+    def reach(self) -> float: ...
 
     def seed(self, balls: Balls, field: Field, *, threads: int, watch: Callable[[float], object]) -> ParticleReport: ...
 
@@ -91,3 +101,46 @@ def _step(before: float | None, seconds: float | None) -> float | None:
     if before is None or seconds is None or abs(seconds - before) > LONGEST_STEP:
         return None
     return seconds - before
+
+
+@dataclass(frozen=True)
+class ShownParticles(Generic[Particles]):
+    """Surface particles at the time of an image, and how they came there.
+
+    Attributes
+    ----------
+    particles, report
+        Those, and what happened to them since the image before.
+    """
+
+    particles: Particles
+    report: ParticleReport
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """See :attr:`method.Surface.counts`."""
+        report = self.report
+        return {"particles": len(self.particles), "particles_placed": report.placed, "particles_lost": report.lost}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See :attr:`method.Surface.notes`."""
+        if not len(self.particles) or self.particles.reach <= TOO_SPARSE:
+            return ()
+        count = len(self.particles)
+        return (
+            f"{count} surface particles are too few for this fluid, parts of it are missing: raise their number, or set it to 0",
+        )
+
+
+def particles_at(request: Request, name: str, make: Callable[[], Particles]) -> ShownParticles[Particles]:
+    """The surface particles of a request's time, which follow those of the image before in its sequence.
+
+    `name` is the method's; `make` makes particles for the request's settings. The errors are those of
+    :meth:`ParticleFollower.go_to`.
+    """
+    key = tuple(sorted(request.settings.items()))
+    follower = request.instant.sequence.kept(name, key, lambda: ParticleFollower(make()))
+    seconds = request.instant.seconds if request.settings[FOLLOWS.name] else None
+    report = follower.go_to(request.balls, request.field, seconds, threads=request.threads, watch=request.watch)
+    return ShownParticles(follower.particles, report)

@@ -270,7 +270,7 @@ class _Shot:
         balls = self.request.balls
         info = self.choice.info
         report = RenderInfo(info.name, info.backend, self.choice.runner.device, self.choice.reason, dropped=dict(balls.dropped))
-        report.milliseconds, report.notes = dict(surface.milliseconds), self.notes
+        report.milliseconds, report.notes = dict(surface.milliseconds), (*self.notes, *surface.notes)
         report.counts = {"balls": len(balls), **surface.counts, **known_counts(balls, self.request.field)}
         if unfinished := surface.counts.get("unfinished"):
             report.notes += (f"{unfinished} pixels were left out because the method reached its limits there; raise these",)

@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ....addon.fluid.camera import Camera
+from ....addon.fluid.kernels import KERNELS
 from ....addon.render.method import Request, timed
-from ....addon.render.particle_follower import ParticleFollower
-from ....addon.render.particle_settings import EXACT, FOLLOWS, simulation_options
+from ....addon.render.particle_follower import ShownParticles, particles_at
+from ....addon.render.particle_settings import EXACT, simulation_options
 from ...context import GpuContext, shared_context
 from ...parted_method import PartedMethod
 from ...stage_times import StageTimes
+from ...step import Step
 from ...surface_textures import SurfaceTextures
 from .crowds import best_crowd
 from .drawing import Drawing
 from .params import METHOD
+from .programs import programs_of
 from .simulation import GpuSurfaceParticles, SimulationOptions
 
 
-class SurfaceParticlesMethod(PartedMethod[GpuSurfaceParticles]):
+class SurfaceParticlesMethod(PartedMethod[ShownParticles[GpuSurfaceParticles]]):
     """The method on one OpenGL context."""
 
     def __init__(self, context: GpuContext) -> None:
@@ -26,31 +29,35 @@ class SurfaceParticlesMethod(PartedMethod[GpuSurfaceParticles]):
         context.require(METHOD.gl_version, 3 + len(METHOD.attributes))
         super().__init__(context, METHOD)
         self._crowd = context.run(lambda: best_crowd(context))
+        # A driver that rejects the shaders is to be known before the method is chosen.
+        context.run(lambda: [Step(context, source) for source in programs_of(KERNELS["wyvill"])])
 
-    def scene_of(self, request: Request, milliseconds: dict[str, float]) -> GpuSurfaceParticles | None:
-        """The particles of the request's time; they follow those of the image before in its sequence."""
-        if not len(request.balls):
-            return None
-        key = self._context, tuple(sorted(request.settings.items()))
-        follower = request.instant.sequence.kept("surface_particles", key, lambda: self._follower(request))
-        seconds = request.instant.seconds if request.settings[FOLLOWS.name] else None
+    def scene_of(self, request: Request, milliseconds: dict[str, float]) -> ShownParticles[GpuSurfaceParticles] | None:
+        """The particles of the request's time."""
         with timed(milliseconds, "particles"):
-            follower.go_to(request.balls, request.field, seconds, threads=request.threads, watch=request.watch)
-        return follower.particles if len(follower.particles) else None
+            return particles_at(request, f"{METHOD.name} {id(self)}", lambda: self._particles(request))
 
-    def _follower(self, request: Request) -> ParticleFollower[GpuSurfaceParticles]:
-        options = SimulationOptions(**simulation_options(request.settings))
-        return ParticleFollower(GpuSurfaceParticles(self._context, self._crowd, options))
+    def _particles(self, request: Request) -> GpuSurfaceParticles:
+        return GpuSurfaceParticles(self._context, self._crowd, SimulationOptions(**simulation_options(request.settings)))
 
-    def counts_of(self, scene: GpuSurfaceParticles) -> Mapping[str, int]:
+    def counts_of(self, scene: ShownParticles[GpuSurfaceParticles]) -> Mapping[str, int]:
         """See :meth:`PartedMethod.counts_of`."""
-        return {"particles": len(scene)}
+        return scene.counts
 
-    def fill(self, request: Request, scene: GpuSurfaceParticles, camera: Camera, textures: SurfaceTextures) -> None:
+    def notes_of(self, scene: ShownParticles[GpuSurfaceParticles]) -> tuple[str, ...]:
+        """See :meth:`PartedMethod.notes_of`."""
+        return scene.notes
+
+    def fill(
+        self, request: Request, scene: ShownParticles[GpuSurfaceParticles], camera: Camera, textures: SurfaceTextures
+    ) -> None:
         """See :meth:`PartedMethod.fill`."""
+        if not len(scene.particles):
+            textures.clear()
+            return
         times = StageTimes(self._context)
         with times.of("draw"):
-            Drawing(self._context, request, scene, bool(request.settings[EXACT.name])).draw(camera, textures)
+            Drawing(self._context, request, scene.particles, bool(request.settings[EXACT.name])).draw(camera, textures)
         textures.add_report(times.milliseconds, {})
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from ....addon.fluid.kernels import KERNELS, PolynomialKernel
+from ....addon.fluid.kernels import KERNELS, Kernel, PolynomialKernel
 from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
 from ...kernel_constants import kernel_constants
@@ -70,6 +70,13 @@ class DrawPrograms:
             "WITH_BALLS": int("ball" in self.attributes),
             **{f"{name.upper()}_LOCATION": location for location, name in enumerate(self.attributes, start=2)},
         }
+
+
+def programs_of(kernel: Kernel) -> list[ProgramSource]:
+    """What moves and draws particles on a fluid of a density kernel that is a polynomial; none of it for others."""
+    if not isinstance(kernel, PolynomialKernel):
+        return []
+    return [*MotionPrograms(kernel).programs().values(), *DrawPrograms(kernel).programs().values()]
 
 
 def image_programs() -> dict[str, ProgramSource]:

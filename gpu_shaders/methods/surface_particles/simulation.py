@@ -74,6 +74,11 @@ class GpuSurfaceParticles:
         self._reach = 0.0
         self._step = 0
 
+    @property
+    def reach(self) -> float:
+        """How far particles push one another, in influence radii."""
+        return self._reach
+
     def __len__(self) -> int:
         return 0 if self._state is None else self._state.count
 
