@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-clusters bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-light bench-scaling lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-clusters bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-van-kooten bench-light bench-scaling lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -61,6 +61,9 @@ bench-mishima: setup ## Time Equal Interval on the scenes of docs/mishima_2008.m
 
 bench-mueller: setup ## Time the methods and data sets of docs/mueller_2007.md (ARGS="--scenes ethane --pictures")
 	@PYTHONPATH=tests $(VENV) -m bench.mueller_2007 $(ARGS)
+
+bench-van-kooten: setup ## Repeat the experiments of docs/van_kooten_2007.md (ARGS=--pictures renders its pictures)
+	@PYTHONPATH=tests $(VENV) -m bench.van_kooten_2007 $(ARGS)
 
 bench-export: setup ## Time passes and files beside the surface, and watch the memory over 500 frames (ARGS="--frames 10")
 	@PYTHONPATH=tests $(VENV) -m bench.export $(ARGS)
