@@ -66,6 +66,25 @@ def expected(meniscus, scene, **changes):
     )
 
 
+def test_frames_of_an_animation_are_one_sequence(meniscus, scene, tmp_path, monkeypatch):
+    """So that surface particles go on from frame to frame, and let go of what they keep when it is over."""
+    package = f"{meniscus.__name__}.addon"
+    render_scene, engine = (importlib.import_module(f"{package}.blender.{name}") for name in ("render_scene", "engine"))
+    instants, plain = [], render_scene.render
+
+    def noting(*arguments, instant, **options):
+        instants.append(instant)
+        return plain(*arguments, instant=instant, **options)
+
+    monkeypatch.setattr(render_scene, "render", noting)
+    scene.frame_start, scene.frame_end, scene.render.fps = 3, 4, 25
+    scene.render.filepath = str(tmp_path / "frame_")
+    assert bpy.ops.render.render(animation=True) == {"FINISHED"}
+    assert {round(25 * instant.seconds) for instant in instants} == {3, 4}
+    assert len({instant.sequence for instant in instants}) == 1
+    assert not engine._sequences
+
+
 def test_passes_are_those_of_the_package(meniscus, scene, rendered):
     passes, image = rendered(), expected(meniscus, scene)
     for name, channels in (("Normal", "XYZ"), ("Position", "XYZ"), ("Color", "RGB"), ("Velocity", "XYZ")):

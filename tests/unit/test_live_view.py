@@ -35,14 +35,15 @@ class FakeRender:
     """Notes what it is asked for; waits where a test holds it."""
 
     def __init__(self):
-        self.cameras = []
+        self.cameras, self.instants = [], []
         self.going = threading.Event()
         self.going.set()
         self.begun = threading.Event()
         self.failure = None
 
-    def __call__(self, balls, camera, field, is_cancelled, **_):
+    def __call__(self, balls, camera, field, is_cancelled, instant=None, **_):
         self.cameras.append(camera)
+        self.instants.append(instant)
         self.begun.set()
         while not self.going.wait(0.001):
             if is_cancelled():
@@ -129,6 +130,17 @@ def test_whatever_changes_the_image_asks_for_a_new_one(renderer, fake, change):
     live.show(view)
     assert live.wait(SOON)
     assert live.pictures[0].view.shows_the_same(view)
+
+
+def test_images_of_a_view_are_one_sequence_and_know_their_time(renderer, fake):
+    live, other = renderer.open(), renderer.open()
+    for view, seconds in ((live, 1.0), (live, 1.5), (other, 1.5)):
+        view.show(replace(VIEW, balls=meniscus.Balls([[0, 0, 0]], 0.9), seconds=seconds, samples=1))
+        assert view.wait(SOON)
+    seconds, sequences = zip(*((instant.seconds, instant.sequence) for instant in fake.instants), strict=True)
+    assert set(seconds) == {1.0, 1.5}
+    assert len(set(sequences)) == 2
+    assert sequences[0] is sequences[seconds.index(1.5)] is not sequences[-1]
 
 
 def test_the_newest_view_wins_and_those_between_are_never_rendered(renderer, fake):
