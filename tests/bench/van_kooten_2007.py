@@ -16,7 +16,7 @@ from meniscus.addon.render.particle_follower import ParticleFollower
 from meniscus.addon.render.surface_particles import ParticleCloud
 from meniscus.gpu_shaders.context import shared_context
 from meniscus.gpu_shaders.methods.surface_particles.crowds import Crowd, GridCrowd, ImageCrowd, Reaches
-from meniscus.gpu_shaders.methods.surface_particles.state import ParticleState
+from meniscus.gpu_shaders.methods.surface_particles.state import ParticleState, Pressures
 
 from . import machine, report
 from .timing import ALL, Plan, interleave, statistics_by_stage, timed
@@ -62,13 +62,19 @@ def query_table(plan: Plan) -> str:
     """How often a second neighbours are found in a glass of water, by how far they are looked for (figure 10)."""
     context, cloud = shared_context(), seeded(glass(), COUNT).cloud
     state = context.run(lambda: ParticleState.of(context, cloud))
+    pressures = context.run(lambda: Pressures(context, state.count))
     spacing = float(np.median(cloud.spacings)) / (GLASS_REACH * GLASS_SPACING)
     kinds = [kind for kind in (ImageCrowd, GridCrowd) if kind is ImageCrowd or context.version >= 430]
     crowds = {kind.__name__: context.run(lambda kind=kind: kind(context)) for kind in kinds}  # type: ignore[misc]
 
     def search(crowd: Crowd, size: float) -> Callable[[], object]:
         reaches = Reaches(size * spacing, (GLASS_REACH * GLASS_SPACING,) * 2)
-        return lambda: context.run(lambda: crowd.press(state, reaches, 1).read())
+
+        def once() -> object:
+            crowd.press(state, reaches, 1, pressures)
+            return pressures.read_company()
+
+        return lambda: context.run(once)
 
     cases = {(name, size): timed(search(crowd, size)) for name, crowd in crowds.items() for size in QUERY_SIZES}
     outcomes = interleave(cases, plan)

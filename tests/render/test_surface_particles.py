@@ -11,7 +11,7 @@ from meniscus.addon.render.surface_particles import ParticleCloud
 from meniscus.gpu_shaders.context import shared_context
 from meniscus.gpu_shaders.methods.surface_particles.crowds import GridCrowd, ImageCrowd, Reaches
 from meniscus.gpu_shaders.methods.surface_particles.simulation import GpuSurfaceParticles, SimulationOptions
-from meniscus.gpu_shaders.methods.surface_particles.state import ParticleState
+from meniscus.gpu_shaders.methods.surface_particles.state import ParticleState, Pressures
 
 FIELD = meniscus.Field("wyvill", 0.2)
 CROWDS = [ImageCrowd, GridCrowd]
@@ -68,7 +68,9 @@ def company(kind, positions, normals, scales, reach) -> np.ndarray:
         )
         state = ParticleState.of(context, cloud)
         reaches = Reaches(reach, (float(np.min(scales)), float(np.max(scales))))
-        return kind(context).press(state, reaches, 1).read_company().copy()
+        pressures = Pressures(context, state.count)
+        kind(context).press(state, reaches, 1, pressures)
+        return pressures.read_company().copy()
 
     return context.run(count)
 

@@ -70,8 +70,8 @@ class Reaches:
 class Crowd(Protocol):
     """Finds out what particles do to one another."""
 
-    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
-        """The pressure on each; `step` is a number that differs from step to step."""
+    def press(self, state: ParticleState, reaches: Reaches, step: int, pressures: Pressures) -> None:
+        """Write the pressure on each; `step` is a number that differs from step to step."""
         ...
 
 
@@ -88,10 +88,9 @@ class ImageCrowd:
         self._queries = OcclusionQueries(context)
         self._images: _CrowdImages | None = None
 
-    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
+    def press(self, state: ParticleState, reaches: Reaches, step: int, pressures: Pressures) -> None:
         """See :meth:`Crowd.press`."""
         gl, images = self._context.gl, self._images_for(state.count)
-        pressures = Pressures(self._context, state.count)
         pressures.framebuffer.clear()
         uniforms = {
             **state.uniforms,
@@ -105,7 +104,6 @@ class ImageCrowd:
         for level in range(reaches.levels):
             self._set_uniforms({"level": level, "pixel_width": reaches.side(level) / _PIXELS_A_CELL})
             self._press_level(state, images, pressures)
-        return pressures
 
     def _set_uniforms(self, values: Mapping[str, object]) -> None:
         for step in self._steps.values():
@@ -173,9 +171,8 @@ class GridCrowd:
         self._steps = {name: ComputeStep(context, source) for name, source in grid_programs().items()}
         self._buffers: tuple[int, list[moderngl.Buffer]] | None = None
 
-    def press(self, state: ParticleState, reaches: Reaches, step: int) -> Pressures:
+    def press(self, state: ParticleState, reaches: Reaches, step: int, pressures: Pressures) -> None:
         """See :meth:`Crowd.press`."""
-        pressures = Pressures(self._context, state.count)
         buckets = 1 << (state.count - 1).bit_length()
         for binding, buffer in enumerate(self._buffers_for(buckets)):
             self._storage.fill(buffer, 0)
@@ -186,7 +183,6 @@ class GridCrowd:
             each.use_textures(state.textures)
             threads = buckets if name in ("grid_allot", "grid_sort") else state.count
             each.run_in_lines(-(-threads // THREADS))
-        return pressures
 
     def _buffers_for(self, buckets: int) -> list[moderngl.Buffer]:
         """The counts, the buckets, and as many members at most."""

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.field import Field
+from ....addon.fluid.kernels import PolynomialKernel
 from ....addon.render.native import let_interrupt
 from ....addon.render.surface_particles import ParticleCloud, ParticleReport, SurfaceParticles, adapted_reach
 from ...context import GpuContext
@@ -71,6 +72,7 @@ class GpuSurfaceParticles:
         self._fluid: FluidTextures | None = None
         self._state: ParticleState | None = None
         self._discs: Discs | None = None
+        self._steps: tuple[PolynomialKernel, dict[str, Step]] | None = None
         self._reach = 0.0
         self._step = 0
 
@@ -148,21 +150,30 @@ class GpuSurfaceParticles:
     def _spread(self, fluid: FluidTextures, cloud: ParticleCloud) -> int:
         """Spread particles over a fluid; how many changed their places."""
         self._fluid, self._state, self._discs = fluid, None, None
-        if not len(cloud.positions):
+        count = len(cloud.positions)
+        if not count:
             return 0
-        state = ParticleState.of(self._context, cloud)
+        state, moved = ParticleState.of(self._context, cloud), ParticleState(self._context, count)
+        pressures = Pressures(self._context, count)
         if self._options.fills_gaps and self._options.steps and self._options.count:
-            company = self._press(fluid, state).read_company()
-            self._reach = adapted_reach(float(np.mean(company, dtype=np.float64)), self._reach)
+            self._press(fluid, state, pressures)
+            company = float(np.mean(pressures.read_company(), dtype=np.float64))
+            self._reach = adapted_reach(company, self._reach)
         for _ in range(self._options.steps):
             self._step += 1
-            pressures = self._press(fluid, state)
-            state = self._spread_step(fluid, state, pressures)
-        self._state, self._discs = state, self._noted(fluid, state)
+            self._press(fluid, state, pressures)
+            self._move(fluid, state, pressures, moved)
+            state, moved = moved, state
+        self._press(fluid, state, pressures)
+        self._state, self._discs = state, Discs(self._context, count)
+        self._draw("note", fluid, state, self._discs.framebuffer, {"reach": self._reach}, pressures.textures)
         return int(state.read()[1][:, 3].sum())
 
-    def _spread_step(self, fluid: FluidTextures, state: ParticleState, pressures: Pressures) -> ParticleState:
-        moved = ParticleState(self._context, state.count)
+    def _press(self, fluid: FluidTextures, state: ParticleState, pressures: Pressures) -> None:
+        self._crowd.press(state, Reaches(self._reach, fluid.radii), self._step, pressures)
+
+    def _move(self, fluid: FluidTextures, state: ParticleState, pressures: Pressures, moved: ParticleState) -> None:
+        """A step of repulsion and dispersion."""
         values = {
             "reach": self._reach,
             "push": PUSH,
@@ -170,17 +181,6 @@ class GpuSurfaceParticles:
             "disperses": self._options.disperses,
         }
         self._draw("spread", fluid, state, moved.framebuffer, values, pressures.textures)
-        return moved
-
-    def _press(self, fluid: FluidTextures, state: ParticleState) -> Pressures:
-        return self._crowd.press(state, Reaches(self._reach, fluid.radii), self._step)
-
-    def _noted(self, fluid: FluidTextures, state: ParticleState) -> Discs:
-        """What the particles draw."""
-        discs = Discs(self._context, state.count)
-        company = self._press(fluid, state).textures
-        self._draw("note", fluid, state, discs.framebuffer, {"reach": self._reach}, company)
-        return discs
 
     def _draw(
         self,
@@ -192,9 +192,15 @@ class GpuSurfaceParticles:
         textures: Mapping[str, moderngl.Texture] | None = None,
     ) -> None:
         """Draw a fragment for each particle."""
-        step = Step(self._context, MotionPrograms(fluid.field.density_kernel).programs()[name])
+        step = self._steps_for(fluid.field.polynomial_kernel)[name]
         step.set_uniforms({**fluid.uniforms, **state.uniforms, **values})
         step.draw_plainly(target, {**fluid.textures, **state.textures, **(textures or {})})
+
+    def _steps_for(self, kernel: PolynomialKernel) -> dict[str, Step]:
+        if self._steps is None or self._steps[0] != kernel:
+            programs = MotionPrograms(kernel).programs()
+            self._steps = kernel, {name: Step(self._context, source) for name, source in programs.items()}
+        return self._steps[1]
 
 
 def _anchor(balls: Balls) -> Doubles:

@@ -105,7 +105,3 @@ class Pressures:
     def read_company(self) -> FloatArray:
         """(M,): how many others each has within reach."""
         return self._company.read()[:, 0]
-
-    def read(self) -> FloatArray:
-        """(M, 4): force and density."""
-        return self._pressure.read()
