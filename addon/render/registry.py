@@ -23,6 +23,7 @@ _FOLDERS = (
     "gpu_shaders.methods.vicinity",
     "gpu_shaders.methods.walking_depth_plane",
     "gpu_shaders.methods.surface_particles",
+    "addon.render.disc_caster",
     # What is no metaballs.
     "gpu_shaders.methods.glyphs",
     "addon.render.glyph_caster",

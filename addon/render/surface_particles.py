@@ -9,9 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fluid.balls import Balls
+from ..fluid.camera import Camera
 from ..fluid.errors import InputError
 from ..fluid.field import Field
+from ..fluid.passes import DEPTH_BACKGROUND
 from . import native
+from .method import Surface
 
 MOST_SECONDS = 1e6
 """Longer steps in time are a mistake."""
@@ -194,6 +197,47 @@ class SurfaceParticles:
         """
         with native.translated_errors():
             return int(self._particles.refill(positions, normals, scales, reach=reach, step=step, threads=threads, watch=watch))
+
+    def draw(
+        self,
+        balls: Balls,
+        camera: Camera,
+        surface: Surface,
+        *,
+        is_exact: bool,
+        threads: int = 0,
+        watch: Callable[[float], object] = native.let_interrupt,
+    ) -> None:
+        """Fill a surface of a camera's size with what it sees of the particles as discs (section 7.6).
+
+        Parameters
+        ----------
+        balls
+            Those that the particles are on.
+        camera
+            Without a region.
+        is_exact
+            Whether what the discs show is moved onto the surface in each pixel.
+
+        Raises
+        ------
+        InputError, DeviceError
+            Sizes differ, or nothing was seeded yet; there is too little memory.
+        """
+        pairs = ((balls.colors, surface.color), (balls.velocities, surface.velocity))
+        with native.translated_errors():
+            native.load().draw_discs(
+                self._particles,
+                surface.depth,
+                surface.normal,
+                background=DEPTH_BACKGROUND,
+                is_exact=is_exact,
+                **native.view_arguments(camera),
+                ball=surface.ball,
+                attributes=[(source, target) for source, target in pairs if source is not None and target is not None],
+                threads=threads,
+                watch=watch,
+            )
 
     @property
     def reach(self) -> float:

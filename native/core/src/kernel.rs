@@ -53,6 +53,14 @@ impl Kernel {
         (1..=MAX_POWER).rev().fold(0.0, |sum, power| sum * x + power as f64 * self.coefficients[power])
     }
 
+    /// `f''(x)`, 0 where `x <= 0`.
+    pub fn second_derivative(&self, x: f64) -> f64 {
+        if x <= 0.0 {
+            return 0.0;
+        }
+        (2..=MAX_POWER).rev().fold(0.0, |sum, power| sum * x + (power * (power - 1)) as f64 * self.coefficients[power])
+    }
+
     /// x in [0, 1] with `f(x) = density`, where `density` is in [0, 1].
     pub fn inverse(&self, density: f64) -> Option<f64> {
         if !(0.0..=1.0).contains(&density) {
@@ -101,13 +109,15 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn derivative_is_the_slope_of_value() {
+    fn derivatives_are_the_slopes_of_what_they_derive() {
         for (name, kernel) in kernels() {
             for x in [0.1, 0.5, 0.9] {
                 let slope = (kernel.value(x + 1e-6) - kernel.value(x - 1e-6)) / 2e-6;
                 assert!((kernel.derivative(x) - slope).abs() < 1e-8, "{name} {x}");
+                let change = (kernel.derivative(x + 1e-6) - kernel.derivative(x - 1e-6)) / 2e-6;
+                assert!((kernel.second_derivative(x) - change).abs() < 1e-8, "{name} {x}");
             }
-            assert_eq!(kernel.derivative(-0.5), 0.0);
+            assert_eq!([kernel.derivative(-0.5), kernel.second_derivative(-0.5)], [0.0; 2]);
         }
     }
 

@@ -3,6 +3,7 @@
 
 mod arrays;
 mod clusters;
+mod discs;
 mod fitted_bvh;
 mod glyphs;
 mod neighbours;
@@ -22,6 +23,8 @@ mod meniscus_native {
 
     #[pymodule_export]
     use super::clusters::find_clusters;
+    #[pymodule_export]
+    use super::discs::draw_discs;
     #[pymodule_export]
     use super::fitted_bvh::FittedBvh;
     #[pymodule_export]

@@ -21,7 +21,7 @@ type Arrays<'py> = (Vectors<'py>, Vectors<'py>, Vectors<'py>, Numbers<'py>, Numb
 pub struct SurfaceParticles(Mutex<Particles>);
 
 impl SurfaceParticles {
-    fn locked(&self) -> MutexGuard<'_, Particles> {
+    pub fn locked(&self) -> MutexGuard<'_, Particles> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -5,7 +5,7 @@
 //! drawn by one thread, from front to back. The image does not depend on the number of threads.
 
 mod band;
-mod shape;
+pub(crate) mod shape;
 
 use rayon::prelude::*;
 

@@ -154,6 +154,36 @@ impl Fluid {
         sample
     }
 
+    /// The second derivatives of F by the point: xx, yy, zz, xy, xz, yz.
+    pub fn second_derivatives(&self, point: [f64; 3]) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        self.hash.for_near(point, |ball| {
+            let (center, radius, weight) = self.ball(ball);
+            let [x, y, z] = difference(point, center).map(|c| c / radius);
+            let inside = 1.0 - dot([x, y, z], [x, y, z]);
+            let (change, slope) = (self.field.kernel.second_derivative(inside), self.field.kernel.derivative(inside));
+            let scale = weight / (radius * radius);
+            let products = [x * x, y * y, z * z, x * y, x * z, y * z];
+            for (number, product) in products.into_iter().enumerate() {
+                let along_axis = if number < 3 { 2.0 * slope } else { 0.0 };
+                sum[number] += scale * (4.0 * change * product - along_axis);
+            }
+        });
+        sum
+    }
+
+    /// Visits the balls that reach a point, with the share that each has in the density.
+    pub fn for_shares(&self, point: [f64; 3], mut visit: impl FnMut(usize, f64)) {
+        self.hash.for_near(point, |ball| {
+            let (center, radius, weight) = self.ball(ball);
+            let offset = difference(point, center).map(|c| c / radius);
+            let share = weight * self.field.kernel.value(1.0 - dot(offset, offset));
+            if share != 0.0 {
+                visit(ball, share);
+            }
+        });
+    }
+
     /// The point of the surface that the slope leads to from a point near it; None where it leads nowhere.
     pub fn projected(&self, start: [f64; 3]) -> Option<SurfacePoint> {
         let mut position = start;

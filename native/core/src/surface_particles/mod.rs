@@ -6,6 +6,7 @@
 //! those of the densest places.
 
 mod crowd;
+pub mod discs;
 mod fluid;
 mod hash;
 mod levels;

@@ -52,8 +52,13 @@ impl<'a> Attribute<'a> {
         Self { source, target: Plane::new(target) }
     }
 
+    /// How many balls have it.
+    pub(crate) fn rows(&self) -> usize {
+        self.source.len()
+    }
+
     #[inline(always)]
-    pub(super) fn values(&self, index: u32) -> [f32; 3] {
+    pub(crate) fn values(&self, index: u32) -> [f32; 3] {
         self.source[index as usize]
     }
 }
@@ -103,12 +108,12 @@ impl<'a> Image<'a> {
         [self.width, self.height]
     }
 
-    pub(super) fn attributes(&self) -> &[Attribute<'a>] {
+    pub(crate) fn attributes(&self) -> &[Attribute<'a>] {
         &self.attributes
     }
 
     /// Whether the balls' shares of the density matter.
-    pub(super) fn wants_shares(&self) -> bool {
+    pub(crate) fn wants_shares(&self) -> bool {
         self.ball.is_some() || !self.attributes.is_empty()
     }
 
@@ -130,6 +135,19 @@ impl<'a> Image<'a> {
         }
     }
 
+    /// Writes a pixel; `blended` are the attributes.
+    pub(crate) fn put_pixel(&self, [x, y]: [usize; 2], depth: f32, normal: [f32; 3], ball: i32, blended: &[[f32; 3]]) {
+        let place = y * self.width + x;
+        self.depth.put(place, [depth.to_bits()]);
+        self.normal.put(3 * place, normal.map(f32::to_bits));
+        if let Some(balls) = &self.ball {
+            balls.put(place, [ball as u32]);
+        }
+        for (attribute, vector) in self.attributes.iter().zip(blended) {
+            attribute.target.put(3 * place, vector.map(f32::to_bits));
+        }
+    }
+
     /// Writes a square of pixels of side `side`, as far as it lies in the image; they are all like one of a packet.
     pub(super) fn put_square(&self, corner: [usize; 2], side: usize, pixels: &Pixels, blended: &[[Lanes; 3]], pixel: usize) {
         let bits = |vectors: &[Lanes; 3]| vectors.each_ref().map(|axis| axis.0[pixel].to_bits());
@@ -148,7 +166,7 @@ impl<'a> Image<'a> {
     }
 
     /// Writes that there is nothing in a square of pixels of side `side`, as far as it lies in the image.
-    pub(super) fn put_background(&self, corner: [usize; 2], side: usize) {
+    pub(crate) fn put_background(&self, corner: [usize; 2], side: usize) {
         for (place, count) in self.rows(corner, side) {
             self.depth.fill(place, count, self.background.to_bits());
             self.normal.fill(3 * place, 3 * count, 0);
