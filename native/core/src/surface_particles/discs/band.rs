@@ -17,6 +17,12 @@ const NEAR: f64 = 1e-5;
 /// Where a ray hardly rises through the densities, it is taken to rise by this share of their slope.
 const LEAST_RISE: f64 = 0.05;
 
+/// Sheets of a pixel that are looked at, one after the other, for one that leads to the surface.
+const MOST_SHEETS: usize = 8;
+
+/// Where no sheet is looked for any more: farther than all of them.
+const DONE: f64 = f64::INFINITY;
+
 /// What is drawn into a band.
 pub struct Band<'a> {
     pub fluid: &'a Fluid,
@@ -65,6 +71,11 @@ impl<'a> Band<'a> {
         self.rows().len() * self.view.width
     }
 
+    /// Column and row of a pixel in the image.
+    fn place(&self, pixel: usize) -> [usize; 2] {
+        [pixel % self.view.width, self.rows().start + pixel / self.view.width]
+    }
+
     /// Its discs in camera space, in their order.
     fn discs(&self) -> Result<Vec<(Disc, Place)>> {
         let mut discs = Vec::new();
@@ -102,16 +113,24 @@ impl<'a> Band<'a> {
         let mut insides = memory::filled(false, self.pixels())?;
         if self.can_start_inside {
             for (pixel, is_inside) in insides.iter_mut().enumerate() {
-                let ray = self.ray(pixel % self.view.width, self.rows().start + pixel / self.view.width);
+                let [column, row] = self.place(pixel);
+                let ray = self.ray(column, row);
                 *is_inside = self.fluid.is_inside(self.point(&ray, self.view.clip[0] / ray.direction[2]));
             }
         }
         Ok(insides)
     }
 
-    /// Visits each meeting of a disc and a ray: the pixel in the band, and the disc's radius.
+    /// Visits each meeting of a disc and a ray that belongs to the sheet which is looked for: the pixel in the band, and the disc's
+    /// radius.
     #[inline(always)]
-    fn for_meetings(&self, discs: &[(Disc, Place)], insides: &[bool], mut visit: impl FnMut(usize, &Disc, Meeting)) {
+    fn for_meetings(
+        &self,
+        discs: &[(Disc, Place)],
+        insides: &[bool],
+        befores: &[f64],
+        mut visit: impl FnMut(usize, &Disc, Meeting),
+    ) {
         let rows = self.rows();
         for (disc, place) in discs {
             let [first, end] = place.columns.map(usize::from);
@@ -120,7 +139,12 @@ impl<'a> Band<'a> {
                 let line = (row - rows.start) * self.view.width;
                 for column in first..end {
                     let pixel = line + column;
-                    if let Some(meeting) = disc.meeting(&self.ray(column, row), insides[pixel], self.view.clip) {
+                    if befores[pixel] == DONE {
+                        continue;
+                    }
+                    let meeting = disc.meeting(&self.ray(column, row), insides[pixel], self.view.clip);
+                    let farther = |meeting: &Meeting| meeting.distance - befores[pixel] > BLEND_BEHIND * disc.radius;
+                    if let Some(meeting) = meeting.filter(farther) {
                         visit(pixel, disc, meeting);
                     }
                 }
@@ -128,14 +152,13 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// What the discs of each pixel show: how far the front is, and the blend there.
+    /// The nearest sheet of each pixel behind those before: how far its front is, and the blend there.
     #[inline(always)]
-    fn blended(&self, insides: &[bool]) -> Result<(Vec<f64>, Vec<Blend>)> {
-        let discs = self.discs()?;
+    fn sheet(&self, discs: &[(Disc, Place)], insides: &[bool], befores: &[f64]) -> Result<(Vec<f64>, Vec<Blend>)> {
         let mut fronts = memory::filled(f64::INFINITY, self.pixels())?;
-        self.for_meetings(&discs, insides, |pixel, _, meeting| fronts[pixel] = fronts[pixel].min(meeting.distance));
+        self.for_meetings(discs, insides, befores, |pixel, _, meeting| fronts[pixel] = fronts[pixel].min(meeting.distance));
         let mut blends = memory::filled(Blend::default(), self.pixels())?;
-        self.for_meetings(&discs, insides, |pixel, disc, meeting| {
+        self.for_meetings(discs, insides, befores, |pixel, disc, meeting| {
             let behind = meeting.distance - fronts[pixel];
             if behind <= BLEND_BEHIND * disc.radius {
                 blends[pixel].add(&meeting, behind);
@@ -166,11 +189,8 @@ impl<'a> Band<'a> {
         None
     }
 
-    /// What a pixel shows, between the clip depths.
+    /// What a sheet shows, between the clip depths.
     fn shown(&self, ray: &Ray, front: f64, blend: &Blend, starts_inside: bool) -> Option<Shown> {
-        if blend.weight == 0.0 {
-            return None;
-        }
         let distance = front + blend.distance / blend.weight;
         let shown = if self.is_exact {
             self.surface_near(ray, distance, starts_inside)?
@@ -189,15 +209,26 @@ impl Task for Drawing<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _simd: S) -> Result<()> {
         let Self { band, image } = self;
-        let insides = band.insides()?;
-        let (fronts, blends) = band.blended(&insides)?;
+        let (discs, insides) = (band.discs()?, band.insides()?);
+        let mut befores = memory::filled(f64::NEG_INFINITY, band.pixels())?;
         let mut carried = memory::filled([0.0; 3], image.attributes().len())?;
-        for pixel in 0..band.pixels() {
-            let place = [pixel % band.view.width, band.rows().start + pixel / band.view.width];
-            let ray = band.ray(place[0], place[1]);
-            match band.shown(&ray, fronts[pixel], &blends[pixel], insides[pixel]) {
-                Some(shown) => put(&band, image, place, &ray, &shown, &mut carried),
-                None => image.put_background(place, 1),
+        for _ in 0..MOST_SHEETS {
+            let (fronts, blends) = band.sheet(&discs, &insides, &befores)?;
+            for (pixel, before) in befores.iter_mut().enumerate().filter(|(_, before)| **before != DONE) {
+                *before = fronts[pixel];
+                let place = band.place(pixel);
+                let ray = band.ray(place[0], place[1]);
+                if fronts[pixel] < f64::INFINITY
+                    && let Some(shown) = band.shown(&ray, fronts[pixel], &blends[pixel], insides[pixel])
+                {
+                    put(&band, image, place, &ray, &shown, &mut carried);
+                    *before = DONE;
+                } else {
+                    image.put_background(place, 1);
+                }
+            }
+            if befores.iter().all(|before| *before == DONE) {
+                break;
             }
         }
         Ok(())

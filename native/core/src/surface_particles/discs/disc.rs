@@ -49,11 +49,12 @@ pub struct Meeting {
 }
 
 impl Disc {
-    /// In world space; None where the particle is no longer on the surface. `reach` is how far particles push one another.
+    /// In world space; None where the particle is no longer on the surface. `reach` is how far particles push one another, in
+    /// influence radii.
     pub fn new(fluid: &Fluid, particle: &Particle, reach: f64) -> Option<Self> {
         // Particles have single precision.
         let place = fluid.projected(double(particle.position))?;
-        let radius = (RADIUS_SPACINGS * f64::from(particle.spacing)).max(RADIUS_REACHES * reach);
+        let radius = (RADIUS_SPACINGS * f64::from(particle.spacing)).max(RADIUS_REACHES * reach * f64::from(particle.scale));
         let bend = bend(place.normal, fluid.second_derivatives(place.position), fluid.sample(place.position).gradient);
         Some(Self { middle: place.position, normal: place.normal, bend, radius })
     }

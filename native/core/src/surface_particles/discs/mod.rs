@@ -6,8 +6,9 @@
 //! - The nearest disc of a pixel says how far its front is. All discs that are met at most [`disc::BLEND_BEHIND`] of their radii
 //!   behind that are blended ([`band`]): distance and normal are the means, weighted by `(1 - |x|^2 / r^2)^2` of the distance x
 //!   from the particle and the radius r.
-//! - Exact pictures then move the point along its ray onto the surface, a few steps of Newton's method; where that leads nowhere,
-//!   there is nothing. Else the picture is that of the discs.
+//! - Exact pictures then move the point along its ray onto the surface, a few steps of Newton's method. Where that leads nowhere,
+//!   the discs hang over the surface, mostly at silhouettes: then what was blended is left out, and the nearest of the other discs is
+//!   the front, until one leads to the surface or there is none. Else the picture is that of the discs.
 //! - Colours, velocities and balls are those of the fluid at the point.
 //!
 //! The same as gpu_shaders/methods/surface_particles, in double precision. The image does not depend on the number of threads.
