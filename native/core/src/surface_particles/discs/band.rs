@@ -17,6 +17,9 @@ const NEAR: f64 = 1e-5;
 /// Where a ray hardly rises through the densities, it is taken to rise by this share of their slope.
 const LEAST_RISE: f64 = 0.05;
 
+/// How far beyond the middle of what was tried the next sheet begins, in influence radii.
+const BEYOND: f64 = 0.02;
+
 /// Sheets of a pixel that are looked at, one after the other, for one that leads to the surface.
 const MOST_SHEETS: usize = 8;
 
@@ -52,6 +55,7 @@ struct Blend {
 }
 
 /// A point of the surface on a ray.
+#[derive(Clone, Copy)]
 struct Shown {
     distance: f64,
     /// Unit, world space.
@@ -121,15 +125,14 @@ impl<'a> Band<'a> {
         Ok(insides)
     }
 
-    /// Visits each meeting of a disc and a ray that belongs to the sheet which is looked for: the pixel in the band, and the disc's
-    /// radius.
+    /// Visits each meeting of a disc and a ray that lies beyond what was tried before: the pixel in the band, and the disc's radius.
     #[inline(always)]
     fn for_meetings(
         &self,
         discs: &[(Disc, Place)],
         insides: &[bool],
-        befores: &[f64],
-        mut visit: impl FnMut(usize, &Disc, Meeting),
+        beyonds: &[f64],
+        mut visit: impl FnMut(usize, f64, Meeting),
     ) {
         let rows = self.rows();
         for (disc, place) in discs {
@@ -139,67 +142,70 @@ impl<'a> Band<'a> {
                 let line = (row - rows.start) * self.view.width;
                 for column in first..end {
                     let pixel = line + column;
-                    if befores[pixel] == DONE {
+                    if beyonds[pixel] == DONE {
                         continue;
                     }
                     let meeting = disc.meeting(&self.ray(column, row), insides[pixel], self.view.clip);
-                    let farther = |meeting: &Meeting| meeting.distance - befores[pixel] > BLEND_BEHIND * disc.radius;
-                    if let Some(meeting) = meeting.filter(farther) {
-                        visit(pixel, disc, meeting);
+                    if let Some(meeting) = meeting.filter(|meeting| meeting.distance > beyonds[pixel]) {
+                        visit(pixel, disc.radius, meeting);
                     }
                 }
             }
         }
     }
 
-    /// The nearest sheet of each pixel behind those before: how far its front is, and the blend there.
+    /// The nearest sheet of each pixel beyond what was tried before: how far its front is, and the blend there.
     #[inline(always)]
-    fn sheet(&self, discs: &[(Disc, Place)], insides: &[bool], befores: &[f64]) -> Result<(Vec<f64>, Vec<Blend>)> {
+    fn sheet(&self, discs: &[(Disc, Place)], insides: &[bool], beyonds: &[f64]) -> Result<(Vec<f64>, Vec<Blend>)> {
         let mut fronts = memory::filled(f64::INFINITY, self.pixels())?;
-        self.for_meetings(discs, insides, befores, |pixel, _, meeting| fronts[pixel] = fronts[pixel].min(meeting.distance));
+        self.for_meetings(discs, insides, beyonds, |pixel, _, meeting| fronts[pixel] = fronts[pixel].min(meeting.distance));
         let mut blends = memory::filled(Blend::default(), self.pixels())?;
-        self.for_meetings(discs, insides, befores, |pixel, disc, meeting| {
+        self.for_meetings(discs, insides, beyonds, |pixel, radius, meeting| {
             let behind = meeting.distance - fronts[pixel];
-            if behind <= BLEND_BEHIND * disc.radius {
+            if behind <= BLEND_BEHIND * radius {
                 blends[pixel].add(&meeting, behind);
             }
         });
         Ok((fronts, blends))
     }
 
-    /// Where a ray meets the surface near a distance.
-    fn surface_near(&self, ray: &Ray, distance: f64, starts_inside: bool) -> Option<Shown> {
+    /// Where a ray meets the surface near a distance, between the clip depths; else from where on it may be looked for.
+    fn surface_near(&self, ray: &Ray, near: f64, starts_inside: bool) -> std::result::Result<Shown, f64> {
         let side = if starts_inside { -1.0 } else { 1.0 };
         let direction = self.turned(ray.direction, [0.0; 3]);
-        let mut distance = distance;
+        let (mut distance, mut radius) = (near, 0.0);
         for _ in 0..STEPS {
             let sample = self.fluid.sample(self.point(ray, distance));
             let slope = dot(sample.gradient, sample.gradient).sqrt();
             let (rise, missing) =
                 (side * dot(sample.gradient, direction), side * (self.fluid.field().isovalue - sample.density));
+            radius = sample.radius.max(radius);
             if slope == 0.0 {
-                return None;
+                break;
             }
             if missing.abs() <= NEAR * slope * sample.radius && rise > 0.0 {
-                return Some(Shown { distance, normal: sample.gradient.map(|c| -c / slope) });
+                let shown = Shown { distance, normal: sample.gradient.map(|c| -c / slope) };
+                return if self.is_between_clips(ray, distance) { Ok(shown) } else { Err(near + BEYOND * radius) };
             }
             let longest = LONGEST_STEP * sample.radius;
             distance += (missing / rise.max(LEAST_RISE * slope)).clamp(-longest, longest);
         }
-        None
+        Err(near + BEYOND * radius)
     }
 
-    /// What a sheet shows, between the clip depths.
-    fn shown(&self, ray: &Ray, front: f64, blend: &Blend, starts_inside: bool) -> Option<Shown> {
+    fn is_between_clips(&self, ray: &Ray, distance: f64) -> bool {
+        let depth = distance * ray.direction[2];
+        depth >= self.view.clip[0] && depth <= self.view.clip[1]
+    }
+
+    /// What a sheet shows; where that is nothing, from where on the next one may be looked for.
+    fn shown(&self, ray: &Ray, front: f64, blend: &Blend, starts_inside: bool) -> std::result::Result<Shown, f64> {
         let distance = front + blend.distance / blend.weight;
-        let shown = if self.is_exact {
-            self.surface_near(ray, distance, starts_inside)?
-        } else {
-            let length = dot(blend.normal, blend.normal).sqrt();
-            Shown { distance, normal: self.turned(blend.normal.map(|c| c / length), [0.0; 3]) }
-        };
-        let depth = shown.distance * ray.direction[2];
-        (depth >= self.view.clip[0] && depth <= self.view.clip[1]).then_some(shown)
+        if self.is_exact {
+            return self.surface_near(ray, distance, starts_inside);
+        }
+        let length = dot(blend.normal, blend.normal).sqrt();
+        Ok(Shown { distance, normal: self.turned(blend.normal.map(|c| c / length), [0.0; 3]) })
     }
 }
 
@@ -210,24 +216,27 @@ impl Task for Drawing<'_> {
     fn run<S: Simd>(self, _simd: S) -> Result<()> {
         let Self { band, image } = self;
         let (discs, insides) = (band.discs()?, band.insides()?);
-        let mut befores = memory::filled(f64::NEG_INFINITY, band.pixels())?;
+        for pixel in 0..band.pixels() {
+            image.put_background(band.place(pixel), 1);
+        }
+        let mut beyonds = memory::filled(f64::NEG_INFINITY, band.pixels())?;
         let mut carried = memory::filled([0.0; 3], image.attributes().len())?;
         for _ in 0..MOST_SHEETS {
-            let (fronts, blends) = band.sheet(&discs, &insides, &befores)?;
-            for (pixel, before) in befores.iter_mut().enumerate().filter(|(_, before)| **before != DONE) {
-                *before = fronts[pixel];
+            let (fronts, blends) = band.sheet(&discs, &insides, &beyonds)?;
+            for (pixel, beyond) in beyonds.iter_mut().enumerate().filter(|(_, beyond)| **beyond != DONE) {
+                if blends[pixel].weight == 0.0 {
+                    *beyond = DONE;
+                    continue;
+                }
                 let place = band.place(pixel);
                 let ray = band.ray(place[0], place[1]);
-                if fronts[pixel] < f64::INFINITY
-                    && let Some(shown) = band.shown(&ray, fronts[pixel], &blends[pixel], insides[pixel])
-                {
+                let shown = band.shown(&ray, fronts[pixel], &blends[pixel], insides[pixel]);
+                if let Ok(shown) = shown {
                     put(&band, image, place, &ray, &shown, &mut carried);
-                    *before = DONE;
-                } else {
-                    image.put_background(place, 1);
                 }
+                *beyond = shown.err().unwrap_or(DONE);
             }
-            if befores.iter().all(|before| *before == DONE) {
+            if beyonds.iter().all(|beyond| *beyond == DONE) {
                 break;
             }
         }

@@ -12,6 +12,9 @@ use crate::vectors::{difference, dot, double, plus};
 const RADIUS_SPACINGS: f64 = 1.2;
 const RADIUS_REACHES: f64 = 0.65;
 
+/// A disc says nothing where the surface would have turned away from its middle by more than this cosine.
+const TURNED: f64 = 0.7;
+
 /// What lies farther behind the nearest disc than this, in radii of the disc, is another sheet.
 pub const BLEND_BEHIND: f64 = 0.5;
 
@@ -101,7 +104,8 @@ impl Disc {
             let share = dot(place, place) / radius_2;
             let depth = (along + root) * ray.direction[2] + ray.start[2];
             let is_between = depth >= clip[0] && depth <= clip[1];
-            if share < 1.0 && is_between && (dot(normal, ray.direction) > 0.0) == starts_inside {
+            let is_near = share < 1.0 && dot(normal, self.normal) > TURNED * dot(normal, normal).sqrt();
+            if is_near && is_between && (dot(normal, ray.direction) > 0.0) == starts_inside {
                 let length = dot(normal, normal).sqrt();
                 let normal = normal.map(|c| c / length);
                 return Some(Meeting { distance: along + root, normal, weight: (1.0 - share) * (1.0 - share) });

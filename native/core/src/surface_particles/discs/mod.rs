@@ -1,14 +1,14 @@
 //! Draws surface particles as discs that bend as the surface does (van Kooten, van den Bergen and Telea 2007, section 7.6; there
 //! discs are flat, and only their normals bend).
 //!
-//! - A disc ([`disc`]) is what of a quadric lies within a radius of its particle. A ray meets it at the first point, between the
+//! - A disc ([`disc`]) is what of a quadric lies within a radius of its particle, as far as it does not turn away much. A ray meets it at the first point, between the
 //!   clip depths, where it comes from outside; where a ray starts inside the fluid, where it comes from inside.
 //! - The nearest disc of a pixel says how far its front is. All discs that are met at most [`disc::BLEND_BEHIND`] of their radii
 //!   behind that are blended ([`band`]): distance and normal are the means, weighted by `(1 - |x|^2 / r^2)^2` of the distance x
 //!   from the particle and the radius r.
 //! - Exact pictures then move the point along its ray onto the surface, a few steps of Newton's method. Where that leads nowhere,
-//!   the discs hang over the surface, mostly at silhouettes: then what was blended is left out, and the nearest of the other discs is
-//!   the front, until one leads to the surface or there is none. Else the picture is that of the discs.
+//!   the discs hang over the surface, mostly at silhouettes: then the same is done with the discs that are met beyond, until some
+//!   lead to the surface or there are none. Else the picture is that of the discs.
 //! - Colours, velocities and balls are those of the fluid at the point.
 //!
 //! The same as gpu_shaders/methods/surface_particles, in double precision. The image does not depend on the number of threads.
