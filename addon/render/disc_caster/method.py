@@ -6,8 +6,8 @@ import platform
 
 from .. import native
 from ..method import Request, Surface, timed, unfilled_surface
-from ..particle_follower import ParticleFollower
-from ..particle_settings import EXACT, FOLLOWS, simulation_options
+from ..particle_follower import particles_at
+from ..particle_settings import EXACT, simulation_options
 from ..surface_particles import SurfaceParticles
 
 
@@ -26,13 +26,10 @@ class DiscCaster:
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`; the particles follow those of the image before in the request's sequence."""
         surface = unfilled_surface(request)
-        key = tuple(sorted(request.settings.items()))
-        follower = request.instant.sequence.kept("disc_caster", key, lambda: _follower(request))
-        seconds = request.instant.seconds if request.settings[FOLLOWS.name] else None
         with timed(surface.milliseconds, "particles"):
-            follower.go_to(request.balls, request.field, seconds, threads=request.threads, watch=request.watch)
+            shown = particles_at(request, "disc_caster", lambda: SurfaceParticles(**simulation_options(request.settings)))
         with timed(surface.milliseconds, "draw"):
-            follower.particles.draw(
+            shown.particles.draw(
                 request.balls,
                 request.camera,
                 surface,
@@ -40,12 +37,8 @@ class DiscCaster:
                 threads=request.threads,
                 watch=request.watch,
             )
-        surface.counts = {"particles": len(follower.particles)}
+        surface.counts, surface.notes = shown.counts, shown.notes
         return surface
-
-
-def _follower(request: Request) -> ParticleFollower[SurfaceParticles]:
-    return ParticleFollower(SurfaceParticles(**simulation_options(request.settings)))
 
 
 def create() -> DiscCaster:
