@@ -1,4 +1,4 @@
-//! A band of rows of pixels: the fronts of its pixels, what is blended there, and the surface that this shows.
+//! A band of rows of pixels: how far the nearest disc of each pixel is, and the surface that the discs show.
 
 use super::disc::{BLEND_BEHIND, Disc, Meeting, Ray};
 use crate::bands::{BAND, Bins, Centers, Place};
@@ -7,23 +7,23 @@ use crate::memory;
 use crate::simd::{Simd, Task};
 use crate::surface_particles::fluid::Fluid;
 use crate::tile_caster::{Image, NO_BALL, View};
-use crate::vectors::{dot, double, plus, single};
+use crate::vectors::{dot, double, plus, single, unit};
 
 /// How often a point is moved along its ray, how far at most in influence radii, and how near it must come.
-const STEPS: usize = 6;
+const STEPS: usize = 12;
 const LONGEST_STEP: f64 = 0.1;
 const NEAR: f64 = 1e-5;
 
 /// Where a ray hardly rises through the densities, it is taken to rise by this share of their slope.
-const LEAST_RISE: f64 = 0.05;
+const LEAST_RISE: f64 = 0.01;
 
-/// How far beyond the middle of what was tried the next sheet begins, in influence radii.
+/// How far beyond the front that was tried the next disc is looked for, in influence radii.
 const BEYOND: f64 = 0.02;
 
-/// Sheets of a pixel that are looked at, one after the other, for one that leads to the surface.
-const MOST_SHEETS: usize = 8;
+/// Fronts of a pixel that are tried, one after the other, for one that leads to the surface.
+const MOST_FRONTS: usize = 8;
 
-/// Where no sheet is looked for any more: farther than all of them.
+/// Where no disc is looked for any more: farther than all of them.
 const DONE: f64 = f64::INFINITY;
 
 /// What is drawn into a band.
@@ -55,7 +55,6 @@ struct Blend {
 }
 
 /// A point of the surface on a ray.
-#[derive(Clone, Copy)]
 struct Shown {
     distance: f64,
     /// Unit, world space.
@@ -101,6 +100,11 @@ impl<'a> Band<'a> {
         Ray { start: [0.0; 3], direction: [x * inverse, y * inverse, inverse] }
     }
 
+    fn ray_of(&self, pixel: usize) -> Ray {
+        let [column, row] = self.place(pixel);
+        self.ray(column, row)
+    }
+
     /// A point of a ray in world space.
     fn point(&self, ray: &Ray, distance: f64) -> [f64; 3] {
         self.turned(plus(ray.start, distance, ray.direction), self.view.eye)
@@ -117,15 +121,14 @@ impl<'a> Band<'a> {
         let mut insides = memory::filled(false, self.pixels())?;
         if self.can_start_inside {
             for (pixel, is_inside) in insides.iter_mut().enumerate() {
-                let [column, row] = self.place(pixel);
-                let ray = self.ray(column, row);
+                let ray = self.ray_of(pixel);
                 *is_inside = self.fluid.is_inside(self.point(&ray, self.view.clip[0] / ray.direction[2]));
             }
         }
         Ok(insides)
     }
 
-    /// Visits each meeting of a disc and a ray that lies beyond what was tried before: the pixel in the band, and the disc's radius.
+    /// Visits each meeting of a disc and a ray that still looks for one: the pixel in the band, and the disc's radius.
     #[inline(always)]
     fn for_meetings(
         &self,
@@ -145,8 +148,7 @@ impl<'a> Band<'a> {
                     if beyonds[pixel] == DONE {
                         continue;
                     }
-                    let meeting = disc.meeting(&self.ray(column, row), insides[pixel], self.view.clip);
-                    if let Some(meeting) = meeting.filter(|meeting| meeting.distance > beyonds[pixel]) {
+                    if let Some(meeting) = disc.meeting(&self.ray(column, row), insides[pixel], self.view.clip) {
                         visit(pixel, disc.radius, meeting);
                     }
                 }
@@ -154,26 +156,36 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// The nearest sheet of each pixel beyond what was tried before: how far its front is, and the blend there.
+    /// How far the nearest disc of each pixel is of those that are farther than `beyonds`; infinite where there is none.
     #[inline(always)]
-    fn sheet(&self, discs: &[(Disc, Place)], insides: &[bool], beyonds: &[f64]) -> Result<(Vec<f64>, Vec<Blend>)> {
+    fn fronts(&self, discs: &[(Disc, Place)], insides: &[bool], beyonds: &[f64]) -> Result<Vec<f64>> {
         let mut fronts = memory::filled(f64::INFINITY, self.pixels())?;
-        self.for_meetings(discs, insides, beyonds, |pixel, _, meeting| fronts[pixel] = fronts[pixel].min(meeting.distance));
+        self.for_meetings(discs, insides, beyonds, |pixel, _, meeting| {
+            if meeting.distance > beyonds[pixel] && meeting.distance < fronts[pixel] {
+                fronts[pixel] = meeting.distance;
+            }
+        });
+        Ok(fronts)
+    }
+
+    /// What the discs of each pixel show that are met at its front.
+    #[inline(always)]
+    fn blends(&self, discs: &[(Disc, Place)], insides: &[bool], fronts: &[f64]) -> Result<Vec<Blend>> {
         let mut blends = memory::filled(Blend::default(), self.pixels())?;
-        self.for_meetings(discs, insides, beyonds, |pixel, radius, meeting| {
+        self.for_meetings(discs, insides, fronts, |pixel, radius, meeting| {
             let behind = meeting.distance - fronts[pixel];
             if behind <= BLEND_BEHIND * radius {
                 blends[pixel].add(&meeting, behind);
             }
         });
-        Ok((fronts, blends))
+        Ok(blends)
     }
 
-    /// Where a ray meets the surface near a distance, between the clip depths; else from where on it may be looked for.
-    fn surface_near(&self, ray: &Ray, near: f64, starts_inside: bool) -> std::result::Result<Shown, f64> {
+    /// Where a ray meets the surface near a front, between the clip depths; else from where on another front may be looked for.
+    fn surface_near(&self, ray: &Ray, front: f64, starts_inside: bool) -> std::result::Result<Shown, f64> {
         let side = if starts_inside { -1.0 } else { 1.0 };
         let direction = self.turned(ray.direction, [0.0; 3]);
-        let (mut distance, mut radius) = (near, 0.0);
+        let (mut distance, mut radius) = (front, 0.0);
         for _ in 0..STEPS {
             let sample = self.fluid.sample(self.point(ray, distance));
             let slope = dot(sample.gradient, sample.gradient).sqrt();
@@ -184,13 +196,15 @@ impl<'a> Band<'a> {
                 break;
             }
             if missing.abs() <= NEAR * slope * sample.radius && rise > 0.0 {
-                let shown = Shown { distance, normal: sample.gradient.map(|c| -c / slope) };
-                return if self.is_between_clips(ray, distance) { Ok(shown) } else { Err(near + BEYOND * radius) };
+                if self.is_between_clips(ray, distance) {
+                    return Ok(Shown { distance, normal: sample.gradient.map(|c| -c / slope) });
+                }
+                break;
             }
             let longest = LONGEST_STEP * sample.radius;
             distance += (missing / rise.max(LEAST_RISE * slope)).clamp(-longest, longest);
         }
-        Err(near + BEYOND * radius)
+        Err(front + BEYOND * radius)
     }
 
     fn is_between_clips(&self, ray: &Ray, distance: f64) -> bool {
@@ -198,14 +212,42 @@ impl<'a> Band<'a> {
         depth >= self.view.clip[0] && depth <= self.view.clip[1]
     }
 
-    /// What a sheet shows; where that is nothing, from where on the next one may be looked for.
-    fn shown(&self, ray: &Ray, front: f64, blend: &Blend, starts_inside: bool) -> std::result::Result<Shown, f64> {
-        let distance = front + blend.distance / blend.weight;
-        if self.is_exact {
-            return self.surface_near(ray, distance, starts_inside);
+    /// Draws the surface that the discs lead to.
+    #[inline(always)]
+    fn draw_surface(&self, discs: &[(Disc, Place)], insides: &[bool], image: &mut Writer<'_>) -> Result<()> {
+        let mut beyonds = memory::filled(f64::NEG_INFINITY, self.pixels())?;
+        for _ in 0..MOST_FRONTS {
+            let fronts = self.fronts(discs, insides, &beyonds)?;
+            for (pixel, beyond) in beyonds.iter_mut().enumerate().filter(|(pixel, _)| fronts[*pixel] < f64::INFINITY) {
+                let found = self.surface_near(&self.ray_of(pixel), fronts[pixel], insides[pixel]);
+                if let Ok(shown) = &found {
+                    image.put(self, pixel, shown);
+                }
+                *beyond = found.err().unwrap_or(DONE);
+            }
+            // No disc is beyond where none was found.
+            beyonds
+                .iter_mut()
+                .zip(&fronts)
+                .filter(|(_, front)| **front == f64::INFINITY)
+                .for_each(|(beyond, _)| *beyond = DONE);
+            if beyonds.iter().all(|beyond| *beyond == DONE) {
+                break;
+            }
         }
-        let length = dot(blend.normal, blend.normal).sqrt();
-        Ok(Shown { distance, normal: self.turned(blend.normal.map(|c| c / length), [0.0; 3]) })
+        Ok(())
+    }
+
+    /// Draws the discs as they blend.
+    #[inline(always)]
+    fn draw_discs(&self, discs: &[(Disc, Place)], insides: &[bool], image: &mut Writer<'_>) -> Result<()> {
+        let fronts = self.fronts(discs, insides, &memory::filled(f64::NEG_INFINITY, self.pixels())?)?;
+        let blends = self.blends(discs, insides, &fronts)?;
+        for (pixel, blend) in blends.iter().enumerate().filter(|(_, blend)| blend.weight > 0.0) {
+            let distance = fronts[pixel] + blend.distance / blend.weight;
+            image.put(self, pixel, &Shown { distance, normal: self.turned(unit(blend.normal), [0.0; 3]) });
+        }
+        Ok(())
     }
 }
 
@@ -215,32 +257,16 @@ impl Task for Drawing<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _simd: S) -> Result<()> {
         let Self { band, image } = self;
-        let (discs, insides) = (band.discs()?, band.insides()?);
         for pixel in 0..band.pixels() {
             image.put_background(band.place(pixel), 1);
         }
-        let mut beyonds = memory::filled(f64::NEG_INFINITY, band.pixels())?;
-        let mut carried = memory::filled([0.0; 3], image.attributes().len())?;
-        for _ in 0..MOST_SHEETS {
-            let (fronts, blends) = band.sheet(&discs, &insides, &beyonds)?;
-            for (pixel, beyond) in beyonds.iter_mut().enumerate().filter(|(_, beyond)| **beyond != DONE) {
-                if blends[pixel].weight == 0.0 {
-                    *beyond = DONE;
-                    continue;
-                }
-                let place = band.place(pixel);
-                let ray = band.ray(place[0], place[1]);
-                let shown = band.shown(&ray, fronts[pixel], &blends[pixel], insides[pixel]);
-                if let Ok(shown) = shown {
-                    put(&band, image, place, &ray, &shown, &mut carried);
-                }
-                *beyond = shown.err().unwrap_or(DONE);
-            }
-            if beyonds.iter().all(|beyond| *beyond == DONE) {
-                break;
-            }
+        let (discs, insides) = (band.discs()?, band.insides()?);
+        let mut writer = Writer { image, carried: memory::filled([0.0; 3], image.attributes().len())? };
+        if band.is_exact {
+            band.draw_surface(&discs, &insides, &mut writer)
+        } else {
+            band.draw_discs(&discs, &insides, &mut writer)
         }
-        Ok(())
     }
 }
 
@@ -252,27 +278,37 @@ impl Blend {
     }
 }
 
-/// Writes a pixel; `carried` is room for the attributes.
-fn put(band: &Band<'_>, image: &Image<'_>, place: [usize; 2], ray: &Ray, shown: &Shown, carried: &mut [[f32; 3]]) {
-    let ball = if image.wants_shares() { carry(band.fluid, image, band.point(ray, shown.distance), carried) } else { NO_BALL };
-    image.put_pixel(place, (shown.distance * ray.direction[2]) as f32, single(shown.normal), ball, carried);
+/// Writes pixels.
+struct Writer<'a> {
+    image: &'a Image<'a>,
+    /// Room for the attributes of one.
+    carried: Vec<[f32; 3]>,
 }
 
-/// Finds the attributes at a point, of the balls by their share of the density there; and the ball with the greatest, of equals
-/// the first.
-fn carry(fluid: &Fluid, image: &Image<'_>, point: [f64; 3], carried: &mut [[f32; 3]]) -> i32 {
-    let (mut density, mut greatest, mut dominant) = (0.0, 0.0, NO_BALL);
-    fluid.for_shares(point, |ball, share| {
-        density += share;
-        let ball = ball as i32;
-        if share > greatest || (share == greatest && ball < dominant) {
-            (greatest, dominant) = (share, ball);
-        }
-    });
-    for (attribute, value) in image.attributes().iter().zip(carried) {
-        let mut sum = [0.0; 3];
-        fluid.for_shares(point, |ball, share| sum = plus(sum, share, double(attribute.values(ball as u32))));
-        *value = single(sum.map(|c| if density == 0.0 { 0.0 } else { c / density }));
+impl Writer<'_> {
+    fn put(&mut self, band: &Band<'_>, pixel: usize, shown: &Shown) {
+        let ray = band.ray_of(pixel);
+        let ball = if self.image.wants_shares() { self.carry(band.fluid, band.point(&ray, shown.distance)) } else { NO_BALL };
+        let depth = (shown.distance * ray.direction[2]) as f32;
+        self.image.put_pixel(band.place(pixel), depth, single(shown.normal), ball, &self.carried);
     }
-    dominant
+
+    /// Finds the attributes at a point, of the balls by their share of the density there; and the ball with the greatest, of equals
+    /// the first.
+    fn carry(&mut self, fluid: &Fluid, point: [f64; 3]) -> i32 {
+        let (mut density, mut greatest, mut dominant) = (0.0, 0.0, NO_BALL);
+        fluid.for_shares(point, |ball, share| {
+            density += share;
+            let ball = ball as i32;
+            if share > greatest || (share == greatest && ball < dominant) {
+                (greatest, dominant) = (share, ball);
+            }
+        });
+        for (attribute, value) in self.image.attributes().iter().zip(&mut self.carried) {
+            let mut sum = [0.0; 3];
+            fluid.for_shares(point, |ball, share| sum = plus(sum, share, double(attribute.values(ball as u32))));
+            *value = single(sum.map(|c| if density == 0.0 { 0.0 } else { c / density }));
+        }
+        dominant
+    }
 }

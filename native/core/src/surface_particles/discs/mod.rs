@@ -3,12 +3,12 @@
 //!
 //! - A disc ([`disc`]) is what of a quadric lies within a radius of its particle, as far as it does not turn away much. A ray meets it at the first point, between the
 //!   clip depths, where it comes from outside; where a ray starts inside the fluid, where it comes from inside.
-//! - The nearest disc of a pixel says how far its front is. All discs that are met at most [`disc::BLEND_BEHIND`] of their radii
-//!   behind that are blended ([`band`]): distance and normal are the means, weighted by `(1 - |x|^2 / r^2)^2` of the distance x
-//!   from the particle and the radius r.
-//! - Exact pictures then move the point along its ray onto the surface, a few steps of Newton's method. Where that leads nowhere,
-//!   the discs hang over the surface, mostly at silhouettes: then the same is done with the discs that are met beyond, until some
-//!   lead to the surface or there are none. Else the picture is that of the discs.
+//! - The nearest disc of a pixel says how far its front is. Pictures of the discs alone blend all that are met at most
+//!   [`disc::BLEND_BEHIND`] of their radii behind it ([`band`]): distance and normal are the means, weighted by `(1 - |x|^2 / r^2)^2`
+//!   of the distance x from the particle and the radius r.
+//! - Exact pictures go from the front along the ray to the surface, by steps of Newton's method. Where that leads nowhere, the disc
+//!   hangs over the surface, mostly at silhouettes: then the next disc beyond is the front, until one leads there or there is none.
+//!   It is not the blend from which they start: that may lie behind a thin part that a ray grazes.
 //! - Colours, velocities and balls are those of the fluid at the point.
 //!
 //! The same as gpu_shaders/methods/surface_particles, in double precision. The image does not depend on the number of threads.
