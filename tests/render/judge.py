@@ -44,8 +44,8 @@ BOUNDS = {
     "vicinity": Bounds(wrong=1e-3, distance=0.0125, rms=5e-4, angle=1.0, tilted=2e-3),
     # Where discs cover a pixel its place is exact; at edges, and in creases narrower than a disc, none may lead to the surface.
     "surface_particles": Bounds(wrong=2e-3, distance=2e-3, rms=1e-4, angle=0.5, tilted=2e-3),
-    # The same in double precision. A droplet of a few pixels, or what shows of a ball between others, may have no disc where a ray
-    # meets it, and a ray that grazes may be led past.
+    # The same in double precision. A droplet of a few pixels, or what shows of a ball between others, may have no disc where a
+    # ray meets it, and a ray that grazes may be led past.
     "disc_caster": Bounds(wrong=1e-3, distance=1e-3, rms=1e-4, angle=0.5, tilted=0.0),
 }
 

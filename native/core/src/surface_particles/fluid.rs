@@ -64,11 +64,17 @@ impl Fluid {
     /// `InvalidInput` where velocities are not one finite vector for each ball; `OutOfMemory`.
     pub fn new(balls: &Balls<'_>, velocities: Option<&[[f32; 3]]>, field: Field, cell_share: f64) -> Result<Self> {
         if let Some(velocities) = velocities {
-            let are_finite = velocities.as_flattened().iter().all(|number| number.is_finite());
-            if velocities.len() != balls.len() || !are_finite {
+            let count = balls.len();
+            if velocities.len() != count {
                 return Err(Error::InvalidInput(format!(
-                    "velocities must be a finite vector for each of {} balls",
-                    balls.len()
+                    "there must be {count} velocities, one for each ball, not {}",
+                    velocities.len()
+                )));
+            }
+            let broken = velocities.iter().filter(|velocity| velocity.iter().any(|number| !number.is_finite())).count();
+            if broken > 0 {
+                return Err(Error::InvalidInput(format!(
+                    "{broken} of {count} balls have a velocity that is not finite: correct these, or give no velocities"
                 )));
             }
         }

@@ -157,7 +157,7 @@ impl Placed for Shown<'_> {
 /// How the surface bends where its unit normal is n: A such that it is `n . x + x A x / 2 = 0` near there. Along the surface A is how
 /// the normal changes, `-P H P / |grad F|` with the second derivatives H of F and `P = I - n n^T`; along the normal it is the mean of
 /// that, which is right for spheres. 0 where there is no gradient.
-fn bend(normal: [f64; 3], [xx, yy, zz, xy, xz, yz]: Symmetric, gradient: [f64; 3]) -> Symmetric {
+pub fn bend(normal: [f64; 3], [xx, yy, zz, xy, xz, yz]: Symmetric, gradient: [f64; 3]) -> Symmetric {
     let change = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let flat = axes.map(|axis| plus(axis, -dot(axis, normal), normal));

@@ -15,6 +15,8 @@
 
 mod band;
 mod disc;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 
