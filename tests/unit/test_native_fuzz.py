@@ -6,6 +6,7 @@
 import inspect
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,6 +97,14 @@ def traced_fluid(positions: np.ndarray, radii: np.ndarray, colors: np.ndarray, m
         return meniscus_native.FittedBvh(none, none[:, 0].copy(), none[:, 0].copy(), kernel, 0.2), radii, colors, materials
 
 
+def seeded_particles(positions: np.ndarray, radii: np.ndarray, weights: np.ndarray) -> Any:
+    """Surface particles on balls, on none where these are unusable; or such that were not seeded."""
+    particles = meniscus_native.SurfaceParticles(count=0, cell_share=0.3, steps=1, disperses=True, fills_gaps=True, seed=1)
+    with suppress(ValueError):
+        particles.go(positions, radii, weights, [0, 0, 5 / 9, 4 / 9], 0.2)
+    return particles
+
+
 def traced_meshes(vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, materials: np.ndarray) -> tuple[Any, ...]:
     """Triangles as light meets them, moved to the origin where their vertices are unusable."""
     usable = np.where(np.isfinite(vertices), vertices, 0)
@@ -183,6 +192,13 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
         st.none() | st.just(np.ones((2, 4, 3), np.float32)),
     ),
     "tracing": lambda sizes: TRACING,
+    "particles": lambda sizes: st.builds(
+        seeded_particles, *(array("f4", low, 2, sizes.balls, *shape) for low, shape in ((-2, (3,)), (0.3, ()), (-1, ())))
+    ),
+    "scales": lambda sizes: array("f4", 0.1, 2, sizes.balls),
+    "reach": lambda sizes: st.floats(0.125, 2, width=32),
+    "step": lambda sizes: st.integers(0, 2**32 - 1),
+    "company": lambda sizes: st.floats(0, 99, width=32),
     "number": lambda sizes: st.integers(0, 2**32 - 1),
     "seconds": lambda sizes: st.floats(allow_nan=True, width=32),
     "behind": lambda sizes: st.none() | st.tuples(*[st.floats(width=32)] * 4),
@@ -196,7 +212,18 @@ FITTING: dict[str, Callable[[Sizes], st.SearchStrategy[Any]]] = {
     "threads": lambda sizes: st.integers(0, 3),
     "watch": lambda sizes: st.none() | st.just(lambda share: None) | st.just(raising),
 }
-FLAGS = ("is_perspective", "overlapping", "fits", "tightens", "discards", "proves", "is_film_clear", "disperses", "fills_gaps")
+FLAGS = (
+    "is_perspective",
+    "overlapping",
+    "fits",
+    "tightens",
+    "discards",
+    "proves",
+    "is_film_clear",
+    "disperses",
+    "fills_gaps",
+    "is_exact",
+)
 FITTING["coefficients"] = FITTING["kernel"]
 FITTING |= dict.fromkeys(("view", "previous", "following"), views)
 FITTING |= {name: lambda sizes: st.booleans() for name in FLAGS}

@@ -11,9 +11,9 @@ use crate::surface_particles::SurfaceParticles;
 /// Writes what a camera sees of the discs of surface particles, which have been seeded.
 ///
 /// is_exact: whether what the discs show is moved onto the surface. The camera is that of `TileCaster`. depth (height, width)
-/// float32: planar, background where there is nothing; normal (height, width, 3) float32: unit, world space, out of the fluid; ball
-/// (height, width) int32: index of the ball with the greatest share of the density, -1 where there is none. attributes: pairs of
-/// (N, 3) float32, a row for each ball, and its image (height, width, 3) float32, 0 where there is nothing.
+/// float32: planar, background where there is nothing; normal (height, width, 3) float32: unit, world space, out of the fluid;
+/// ball (height, width) int32: index of the ball with the greatest share of the density, -1 where there is none. attributes:
+/// pairs of (N, 3) float32, a row for each ball, and its image (height, width, 3) float32, 0 where there is nothing.
 #[pyfunction]
 #[pyo3(signature = (particles, depth, normal, *, background, is_exact, camera_from_world, eye, window, is_perspective, width,
                     height, clip, ball=None, attributes=vec![], threads=0, watch=None))]

@@ -293,8 +293,8 @@ impl Writer<'_> {
         self.image.put_pixel(band.place(pixel), depth, single(shown.normal), ball, &self.carried);
     }
 
-    /// Finds the attributes at a point, of the balls by their share of the density there; and the ball with the greatest, of equals
-    /// the first.
+    /// Finds the attributes at a point, of the balls by their share of the density there; and the ball with the greatest, of
+    /// equals the first.
     fn carry(&mut self, fluid: &Fluid, point: [f64; 3]) -> i32 {
         let (mut density, mut greatest, mut dominant) = (0.0, 0.0, NO_BALL);
         fluid.for_shares(point, |ball, share| {

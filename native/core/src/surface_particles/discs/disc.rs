@@ -7,8 +7,8 @@ use crate::surface_particles::fluid::Fluid;
 use crate::tile_caster::View;
 use crate::vectors::{difference, dot, double, plus};
 
-/// A disc's radius in distances of the even spread that there is around its particle, and in reaches at least: what fills gaps lets
-/// none be wider.
+/// A disc's radius in distances of the even spread that there is around its particle, and in reaches at least: what fills gaps
+/// lets none be wider.
 const RADIUS_SPACINGS: f64 = 1.2;
 const RADIUS_REACHES: f64 = 0.65;
 
@@ -154,9 +154,9 @@ impl Placed for Shown<'_> {
     }
 }
 
-/// How the surface bends where its unit normal is n: A such that it is `n . x + x A x / 2 = 0` near there. Along the surface A is how
-/// the normal changes, `-P H P / |grad F|` with the second derivatives H of F and `P = I - n n^T`; along the normal it is the mean of
-/// that, which is right for spheres. 0 where there is no gradient.
+/// How the surface bends where its unit normal is n: A such that it is `n . x + x A x / 2 = 0` near there. Along the surface A
+/// is how the normal changes, `-P H P / |grad F|` with the second derivatives H of F and `P = I - n n^T`; along the normal it
+/// is the mean of that, which is right for spheres. 0 where there is no gradient.
 pub fn bend(normal: [f64; 3], [xx, yy, zz, xy, xz, yz]: Symmetric, gradient: [f64; 3]) -> Symmetric {
     let change = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

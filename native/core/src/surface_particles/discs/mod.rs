@@ -1,17 +1,19 @@
-//! Draws surface particles as discs that bend as the surface does (van Kooten, van den Bergen and Telea 2007, section 7.6; there
-//! discs are flat, and only their normals bend).
+//! Draws surface particles as discs that bend as the surface does (van Kooten, van den Bergen and Telea 2007, section 7.6;
+//! there discs are flat, and only their normals bend).
 //!
-//! - A disc ([`disc`]) is what of a quadric lies within a radius of its particle, as far as it does not turn away much. A ray meets it at the first point, between the
-//!   clip depths, where it comes from outside; where a ray starts inside the fluid, where it comes from inside.
+//! - A disc ([`disc`]) is what of a quadric lies within a radius of its particle, as far as it does not turn away much. A ray
+//!   meets it at the first point, between the clip depths, where it comes from outside; where a ray starts inside the fluid,
+//!   where it comes from inside.
 //! - The nearest disc of a pixel says how far its front is. Pictures of the discs alone blend all that are met at most
-//!   [`disc::BLEND_BEHIND`] of their radii behind it ([`band`]): distance and normal are the means, weighted by `(1 - |x|^2 / r^2)^2`
-//!   of the distance x from the particle and the radius r.
-//! - Exact pictures go from the front along the ray to the surface, by steps of Newton's method. Where that leads nowhere, the disc
-//!   hangs over the surface, mostly at silhouettes: then the next disc beyond is the front, until one leads there or there is none.
-//!   It is not the blend from which they start: that may lie behind a thin part that a ray grazes.
+//!   [`disc::BLEND_BEHIND`] of their radii behind it ([`band`]): distance and normal are the means, weighted by
+//!   `(1 - |x|^2 / r^2)^2` of the distance x from the particle and the radius r.
+//! - Exact pictures go from the front along the ray to the surface, by steps of Newton's method. Where that leads nowhere, the
+//!   disc hangs over the surface, mostly at silhouettes: then the next disc beyond is the front, until one leads there or there
+//!   is none. It is not the blend from which they start: that may lie behind a thin part that a ray grazes.
 //! - Colours, velocities and balls are those of the fluid at the point.
 //!
-//! The same as gpu_shaders/methods/surface_particles, in double precision. The image does not depend on the number of threads.
+//! All of it in double precision. The image does not depend on the number of threads. The discs and their blend are those of
+//! gpu_shaders/methods/surface_particles.
 
 mod band;
 mod disc;
@@ -32,8 +34,8 @@ use crate::tile_caster::Image;
 pub use crate::tile_caster::View;
 
 impl SurfaceParticles {
-    /// Draws what a camera sees of the particles; `is_exact` moves what the discs show onto the surface. Attributes have a row for
-    /// each ball.
+    /// Draws what a camera sees of the particles; `is_exact` moves what the discs show onto the surface. Attributes have a row
+    /// for each ball.
     ///
     /// # Errors
     /// `InvalidInput` for an unusable view or an image of another size, `Cancelled`, `OutOfMemory`.
