@@ -1,7 +1,8 @@
-"""The settings that are saved in the .blend file: ``object.meniscus`` and ``scene.meniscus``."""
+"""The settings that are saved in the .blend file: ``object.meniscus``, ``mesh.meniscus`` and ``scene.meniscus``."""
 
 from __future__ import annotations
 
+import inspect
 import zlib
 from collections.abc import Iterable
 
@@ -23,6 +24,7 @@ from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES
 from ..fluid.tracing import Tracing
 from ..render.registry import method_infos
+from ..render.surface_particles import SurfaceParticles
 from .changes import note_display, note_source
 
 Item = tuple[str, str, str]
@@ -142,6 +144,98 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         default="Color",
         update=note_source,
     )
+
+
+def _update_particles(owner: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Have Blender evaluate a mesh, so that the handler brings its surface particles up to date."""
+    owner.id_data.update_tag()
+
+
+_PARTICLES = inspect.signature(SurfaceParticles).parameters
+
+
+class MENISCUS_PG_mesh(bpy.types.PropertyGroup):
+    """Surface particles of the scene's fluid, as the points of a mesh."""
+
+    use_surface_particles: BoolProperty(
+        name="Surface Particles",
+        description="Whether the points of this mesh are the surface particles of the scene's fluid",
+        default=False,
+        options={"HIDDEN"},
+    )
+    use_live: BoolProperty(
+        name="Live",
+        description="Bring the particles up to date whenever the fluid or the frame changes",
+        default=True,
+        options=set(),
+        update=_update_particles,
+    )
+    count: IntProperty(
+        name="Particles",
+        description="How many there are at most",
+        default=_PARTICLES["count"].default,
+        min=1,
+        max=1 << 24,
+        soft_max=1 << 20,
+        options=set(),
+        update=_update_particles,
+    )
+    steps: IntProperty(
+        name="Steps",
+        description="Steps of repulsion in each frame: more spread the particles more evenly",
+        default=_PARTICLES["steps"].default,
+        min=0,
+        max=1000,
+        soft_max=32,
+        options=set(),
+        update=_update_particles,
+    )
+    cell_share: FloatProperty(
+        name="Cell Size",
+        description="Of the grid in which balls are looked up, as a share of a ball's diameter; it changes the time alone",
+        default=_PARTICLES["cell_share"].default,
+        min=0.05,
+        max=1.0,
+        options=set(),
+        update=_update_particles,
+    )
+    use_dispersion: BoolProperty(
+        name="Dispersion",
+        description="Let particles leave dense places for thin ones at once, with a new id",
+        default=_PARTICLES["disperses"].default,
+        options=set(),
+        update=_update_particles,
+    )
+    use_gap_filling: BoolProperty(
+        name="Fill Gaps",
+        description="Give places without particles some at once, new droplets too",
+        default=_PARTICLES["fills_gaps"].default,
+        options=set(),
+        update=_update_particles,
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Another number, another spread",
+        default=_PARTICLES["seed"].default,
+        min=0,
+        options=set(),
+        update=_update_particles,
+    )
+    bake_folder: StringProperty(
+        name="Folder",
+        description="Where a bake writes its files, one for each frame",
+        default="//surface_particles/",
+        subtype="DIR_PATH",
+        options=set(),
+    )
+    baked_files: StringProperty(
+        name="Baked Files",
+        description="Which files are shown, #### is the frame number; none where the particles are live",
+        options={"HIDDEN"},
+        update=_update_particles,
+    )
+    baked_start: IntProperty(name="Start", description="First frame that is baked", options={"HIDDEN"})
+    baked_end: IntProperty(name="End", description="Last frame that is baked", options={"HIDDEN"})
 
 
 class MENISCUS_PG_scene(bpy.types.PropertyGroup):
@@ -472,6 +566,7 @@ class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
 
 _OWNERS = (
     (bpy.types.Object, MENISCUS_PG_object),
+    (bpy.types.Mesh, MENISCUS_PG_mesh),
     (bpy.types.Scene, MENISCUS_PG_scene),
     (bpy.types.ViewLayer, MENISCUS_PG_view_layer),
 )
