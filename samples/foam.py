@@ -14,15 +14,19 @@ from .one_thread import bpy
 
 PICTURE = Path(__file__).resolve().parents[1] / "out" / "foam.png"
 
-COUNT = 120_000
+COUNT = 150_000
 """Surface particles."""
-LEAD = 12
+LEAD = 5
 """Frames that the particles follow the water before the picture."""
+EYE, TARGET = (4.7, -3.5, 2.3), (2.35, 0.55, 0.45)
+"""A camera that looks at the splash, Blender units."""
 SLOW, FAST = 1.0, 4.0
 """Speeds, Blender units a second: no particle is a bubble below the first, as many as there may be above the second."""
-SHARE = 0.6
+SHARE = 0.9
 """Of the particles that are bubbles where the water is fast."""
-SIZES = (0.003, 0.014)
+STEEP, FLAT = -0.2, 0.5
+"""Heights of the normal: below the first, as against the tank's walls, there is no foam, above the second all that may be."""
+SIZES = (0.002, 0.008)
 """Radii of the least and the greatest bubble, Blender units; most are small."""
 
 
@@ -40,15 +44,16 @@ def main(arguments: list[str] | None = None) -> int:
     return composite.make_picture(options, furnish, render_and_save)
 
 
-def furnish(scene: bpy.types.Scene) -> None:
+def furnish(scene: bpy.types.Scene, count: int = COUNT) -> None:
     """Give a scene with the dam break surroundings, clear water and foam."""
     glass.furnish(scene)
+    scene_parts.add_camera(scene, EYE, TARGET, lens=42.0)
     scene.frame_set(scene.frame_start)
-    add_foam(scene)
+    add_foam(scene, count)
 
 
 def render(scene: bpy.types.Scene, path: Path, frame: int, samples: int) -> None:
-    """Render one frame to a PNG picture, to which the particles have followed the water; RuntimeError says why it cannot be done."""
+    """Render a frame, up to which particles follow the water, to a PNG picture; RuntimeError says why it cannot be done."""
     for before in range(max(frame - LEAD, scene.frame_start), frame):
         scene.frame_set(before)
     glass.render(scene, path, frame, samples)
@@ -76,8 +81,14 @@ def foam_nodes(material: bpy.types.Material) -> bpy.types.NodeTree:
         Value=speed["Value"],
         **{"From Min": SLOW, "From Max": FAST, "To Min": 0.0, "To Max": SHARE},
     )
+    height = tree.node("ShaderNodeSeparateXYZ", Vector=tree.attribute("surface_normal"))
+    openness = tree.node(
+        "ShaderNodeMapRange", interpolation_type="SMOOTHSTEP", Value=height["Z"], **{"From Min": STEEP, "From Max": FLAT}
+    )
+    both = tree.node("ShaderNodeMath", operation="MULTIPLY", Value=chance["Result"])
+    tree.group.links.new(openness["Result"], both.node.inputs[1])
     drawn = tree.node("FunctionNodeRandomValue", Seed=0)
-    is_bubble = tree.node("FunctionNodeCompare", operation="LESS_THAN", A=drawn["Value"], B=chance["Result"])
+    is_bubble = tree.node("FunctionNodeCompare", operation="LESS_THAN", A=drawn["Value"], B=both["Value"])
     # Cubes of even numbers: many small bubbles, few large ones.
     evenly = tree.node("FunctionNodeRandomValue", Seed=1)
     cubed = tree.node("ShaderNodeMath", operation="POWER", Value=evenly["Value"])
