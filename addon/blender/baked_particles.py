@@ -32,9 +32,9 @@ def pattern_for(mesh: bpy.types.Mesh) -> str:
     return f"{folder}{separator}{bpy.path.clean_name(mesh.name)}_####.ply"
 
 
-def baked_path(mesh: bpy.types.Mesh, pattern: str, frame: int) -> Path:
+def baked_path(pattern: str, frame: int) -> Path:
     """The file of a frame."""
-    return frame_path(bpy.path.abspath(pattern, library=mesh.library), frame)
+    return frame_path(bpy.path.abspath(pattern), frame)
 
 
 def write_particles(path: Path, cloud: ParticleCloud) -> None:

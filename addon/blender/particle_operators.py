@@ -163,7 +163,7 @@ class MENISCUS_OT_surface_particles_free(bpy.types.Operator):
         mesh = active_particles(context)
         settings = mesh.meniscus
         frames = range(settings.baked_start, settings.baked_end + 1)
-        _delete([baked_path(mesh, settings.baked_files, frame) for frame in frames])
+        _delete([baked_path(settings.baked_files, frame) for frame in frames])
         CLOUDS.doubt()
         settings.baked_files = ""
         CLOUDS.refresh(mesh, context.evaluated_depsgraph_get())
@@ -218,10 +218,11 @@ class _Bake:
         return "INFO", f"Baked {len(self.written)} frames of surface particles to {self.written[0].parent}"
 
     def _bake(self, frame: int) -> None:
-        scene, mesh = self._scene(), self._mesh()
+        scene = self._scene()
+        self._mesh()  # where it was removed there is nothing to bake for
         scene.frame_set(frame)
         self._fluid.go_to(scene.view_layers[self._view_layer_name].depsgraph, viewport=False)
-        path = baked_path(mesh, self._pattern, frame)
+        path = baked_path(self._pattern, frame)
         write_particles(path, self._fluid.cloud)
         self.written.append(path)
 

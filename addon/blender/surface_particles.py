@@ -1,7 +1,8 @@
 """Surface particles of a scene's fluid, put into the points of meshes: live at each change, or from the files of a bake.
 
-Handlers run in renders, too, and in the background. Blender evaluates anew what a handler has changed before it draws or
-renders, without calling the handler of frames again; that of other changes is called again, and finds nothing to do.
+Handlers run in renders, too, and in the background. Blender evaluates what a handler has changed once more before it draws or
+renders, without calling handlers again. Other scenes and view layers that show the same mesh are evaluated, too, with handlers:
+after a render those of viewports, which so get back what they show.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..fluid.balls import Balls
-from ..fluid.errors import MeniscusError
+from ..fluid.errors import InputError, MeniscusError
 from ..fluid.field import Field
 from ..render.particle_follower import ParticleFollower
 from ..render.surface_particles import ParticleCloud, SurfaceParticles
@@ -163,9 +164,7 @@ class Clouds:
                 return
             shown.seen[place] = moment
             try:
-                problem = (
-                    _show_baked(mesh, depsgraph.scene) if mesh.meniscus.baked_files else _show_live(mesh, depsgraph, shown)
-                )
+                problem = _show(mesh, depsgraph, shown)
             except NoSourceError as error:
                 shown.fluid = None
                 put_particles(mesh, _NOTHING)
@@ -211,9 +210,17 @@ def _moment(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Hashable:
     return source, scene_seconds(scene)
 
 
-def _show_live(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Shown) -> str:
-    if not mesh.meniscus.use_live:
+def _show(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Shown) -> str:
+    """Let a mesh show what it should; what is wrong, one sentence, empty where nothing is."""
+    if mesh.library is not None:
+        raise InputError(f"'{mesh.name}' is linked, so its points cannot change: append it instead")
+    if mesh.meniscus.baked_files:
+        _show_baked(mesh, depsgraph.scene)
         return ""
+    return _show_live(mesh, depsgraph, shown) if mesh.meniscus.use_live else ""
+
+
+def _show_live(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Shown) -> str:
     if shown.fluid is None or shown.fluid.options != options_of(mesh):
         shown.fluid = FollowedFluid(mesh)
     if shown.fluid.go_to(depsgraph, viewport=depsgraph.mode == "VIEWPORT") or not shown.is_whole:
@@ -221,16 +228,15 @@ def _show_live(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Sho
     return shown.fluid.problem
 
 
-def _show_baked(mesh: bpy.types.Mesh, scene: bpy.types.Scene) -> str:
+def _show_baked(mesh: bpy.types.Mesh, scene: bpy.types.Scene) -> None:
     """Show the file of the nearest frame, its particles where they are at the present time."""
     settings = mesh.meniscus
     frame = min(max(scene.frame_current, settings.baked_start), settings.baked_end)
     subframe = scene.frame_subframe if frame == scene.frame_current else 0.0
     if subframe > 0.5 and frame < settings.baked_end:
         frame, subframe = frame + 1, subframe - 1
-    path = baked_path(mesh, settings.baked_files, frame)
+    path = baked_path(settings.baked_files, frame)
     put_particles(mesh, read_particles(path, subframe * frame_seconds(scene)))
-    return ""
 
 
 @persistent
@@ -248,23 +254,12 @@ def _forget(*_: object) -> None:
     CLOUDS.forget()
 
 
-@persistent
-def _return_from_render(*_: object) -> None:
-    """A render leaves the particles of its last frame; what viewports evaluate next brings those of theirs."""
-    for mesh in bpy.data.meshes:
-        if has_surface_particles(mesh):
-            CLOUDS.doubt()
-            mesh.update_tag()
-
-
 _HANDLERS = {
     "frame_change_post": _refresh,
     "depsgraph_update_post": _refresh,
     "undo_post": _doubt,
     "redo_post": _doubt,
     "load_post": _forget,
-    "render_complete": _return_from_render,
-    "render_cancel": _return_from_render,
 }
 
 
