@@ -61,7 +61,7 @@ def render(scene: bpy.types.Scene, path: Path, frame: int, samples: int) -> None
 
 def add_foam(scene: bpy.types.Scene, count: int = COUNT) -> bpy.types.Object:
     """Surface particles of the scene's fluid, which is open, and the nodes that make bubbles of them."""
-    bpy.ops.meniscus.surface_particles_add(count=count)
+    bpy.ops.meniscus.surface_particles_add(particles=count)
     foam = next(item for item in scene.objects if item.type == "MESH" and item.data.meniscus.use_surface_particles)
     foam.name = "Foam"
     foam.modifiers.new("Foam", "NODES").node_group = foam_nodes(_bubble_material())

@@ -10,11 +10,10 @@ import numpy as np
 from ..fluid.errors import InputError
 from ..output.file_names import frame_path
 from ..output.ply import read_points, write_points
-from ..render.surface_particles import ParticleCloud
-from .particle_mesh import RADIUS_SHARE
+from .particle_mesh import ATTRIBUTES, Columns
 
-_VECTORS = {"positions": ("x", "y", "z"), "normals": ("nx", "ny", "nz"), "velocities": ("vx", "vy", "vz")}
-_NAMES = (*(axis for axes in _VECTORS.values() for axis in axes), "radius", "id")
+_VECTORS = {"position": ("x", "y", "z"), "surface_normal": ("nx", "ny", "nz"), "velocity": ("vx", "vy", "vz")}
+_NUMBERS = ("radius", "id")
 
 
 def pattern_for(mesh: bpy.types.Mesh) -> str:
@@ -37,16 +36,16 @@ def baked_path(pattern: str, frame: int) -> Path:
     return frame_path(bpy.path.abspath(pattern), frame)
 
 
-def write_particles(path: Path, cloud: ParticleCloud) -> None:
+def write_particles(path: Path, columns: Columns) -> None:
     """Write a frame; OutputError says why it cannot be written."""
-    columns = {axis: getattr(cloud, name)[:, number] for name, axes in _VECTORS.items() for number, axis in enumerate(axes)}
-    write_points(path, {**columns, "radius": np.float32(RADIUS_SHARE) * cloud.spacings, "id": cloud.ids.view(np.int32)})
+    vectors = {axis: columns[name][:, number] for name, axes in _VECTORS.items() for number, axis in enumerate(axes)}
+    write_points(path, {**vectors, **{name: columns[name] for name in _NUMBERS}})
 
 
-def read_particles(path: Path, seconds: float = 0.0) -> ParticleCloud:
+def read_particles(path: Path, seconds: float = 0.0) -> Columns:
     """The particles of a frame, moved by their velocities to a time so much later; OutputError where they cannot be read."""
-    columns = read_points(path, _NAMES)
-    vectors = {name: np.stack([columns[axis] for axis in axes], axis=1).astype(np.float32) for name, axes in _VECTORS.items()}
-    vectors["positions"] += np.float32(seconds) * vectors["velocities"]
-    spacings = columns["radius"].astype(np.float32) / np.float32(RADIUS_SHARE)
-    return ParticleCloud(**vectors, spacings=spacings, ids=columns["id"].astype(np.int32).view(np.uint32))
+    found = read_points(path, (*(axis for axes in _VECTORS.values() for axis in axes), *_NUMBERS))
+    columns = {name: np.stack([found[axis] for axis in axes], axis=1) for name, axes in _VECTORS.items()}
+    columns |= {name: found[name] for name in _NUMBERS}
+    columns["position"] = columns["position"] + np.float32(seconds) * columns["velocity"]
+    return {name: columns[name].astype(dtype) for name, (_, _, dtype) in ATTRIBUTES.items()}

@@ -13,6 +13,7 @@ from bl_ui.utils import PresetPanel
 from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
 from ..fluid.passes import PASSES
+from ..render.particle_settings import SIMULATION_SETTINGS
 from .compositing import fluid_scene_of
 from .engine_name import ENGINE
 from .method_settings import group_of
@@ -515,7 +516,7 @@ def _draw_particles(layout: bpy.types.UILayout, scene: bpy.types.Scene, mesh: bp
         _draw_text(layout, problem, "ERROR")
     live = _split(layout).column()
     live.enabled = not settings.baked_files
-    for name in ("use_live", "count", "steps", "use_dispersion", "use_gap_filling", "cell_share", "seed", "bake_folder"):
+    for name in ("use_live", *(setting.name for setting in SIMULATION_SETTINGS), "seed", "bake_folder"):
         live.prop(settings, name)
     if settings.baked_files:
         layout.label(text=f"Frames {settings.baked_start} to {settings.baked_end} are baked.", icon="CHECKMARK")

@@ -29,25 +29,17 @@ ATTRIBUTES = {
 faces."""
 
 
+Columns = dict[str, npt.NDArray[Any]]
+"""Values of all :data:`ATTRIBUTES` by name, (N, 3) or (N,)."""
+
+
 def has_surface_particles(data: bpy.types.ID | None) -> bool:
     """Whether an object's own data, not what is evaluated of it, are the surface particles of a fluid."""
     return isinstance(data, bpy.types.Mesh) and data.meniscus.use_surface_particles
 
 
-def put_particles(mesh: bpy.types.Mesh, cloud: ParticleCloud) -> None:
-    """Make particles the points of a mesh, in place of all that it has."""
-    count = len(cloud.ids)
-    if len(mesh.vertices) != count or len(mesh.edges):
-        mesh.clear_geometry()
-        mesh.vertices.add(count)
-    for name, values in _columns(cloud).items():
-        data_type, value, _ = ATTRIBUTES[name]
-        attribute = mesh.attributes.get(name) or mesh.attributes.new(name, data_type, "POINT")
-        attribute.data.foreach_set(value, values.ravel())
-    mesh.update()
-
-
-def _columns(cloud: ParticleCloud) -> dict[str, npt.NDArray[Any]]:
+def columns_of(cloud: ParticleCloud) -> Columns:
+    """The attributes of particles."""
     return {
         "position": cloud.positions,
         "surface_normal": cloud.normals,
@@ -55,3 +47,21 @@ def _columns(cloud: ParticleCloud) -> dict[str, npt.NDArray[Any]]:
         "radius": np.float32(RADIUS_SHARE) * cloud.spacings,
         "id": cloud.ids.view(np.int32),
     }
+
+
+def no_particles() -> Columns:
+    """The attributes of none."""
+    return {name: np.empty((0, 3) if value == "vector" else 0, dtype) for name, (_, value, dtype) in ATTRIBUTES.items()}
+
+
+def put_particles(mesh: bpy.types.Mesh, columns: Columns) -> None:
+    """Make particles the points of a mesh, in place of all that it has."""
+    count = len(columns["id"])
+    if len(mesh.vertices) != count or len(mesh.edges):
+        mesh.clear_geometry()
+        mesh.vertices.add(count)
+    for name, values in columns.items():
+        data_type, value, _ = ATTRIBUTES[name]
+        attribute = mesh.attributes.get(name) or mesh.attributes.new(name, data_type, "POINT")
+        attribute.data.foreach_set(value, values.ravel())
+    mesh.update()

@@ -10,8 +10,10 @@ import bpy
 from bpy.props import IntProperty
 
 from ..fluid.errors import GoneError, InputError, MeniscusError
+from ..render.particle_settings import COUNT
 from .baked_particles import baked_path, pattern_for, write_particles
 from .particle_mesh import has_surface_particles
+from .properties import setting_property
 from .sources import has_sources
 from .surface_particles import CLOUDS, FollowedFluid
 
@@ -33,9 +35,7 @@ class MENISCUS_OT_surface_particles_add(bpy.types.Operator):
     bl_label = "Add Surface Particles"
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
-    count: IntProperty(
-        name="Particles", description="How many there are at most", default=16384, min=1, max=1 << 24, soft_max=1 << 20
-    )
+    particles: setting_property(COUNT)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -48,7 +48,7 @@ class MENISCUS_OT_surface_particles_add(bpy.types.Operator):
         return False
 
     def execute(self, context: bpy.types.Context) -> Result:
-        item = _new_object(context, self.count)
+        item = _new_object(context, self.particles)
         # Handlers write to the mesh, in renders on a thread of their own: viewports must not read it meanwhile.
         context.scene.render.use_lock_interface = True
         CLOUDS.refresh(item.data, context.evaluated_depsgraph_get())
@@ -223,7 +223,7 @@ class _Bake:
         scene.frame_set(frame)
         self._fluid.go_to(scene.view_layers[self._view_layer_name].depsgraph, viewport=False)
         path = baked_path(self._pattern, frame)
-        write_particles(path, self._fluid.cloud)
+        write_particles(path, self._fluid.columns)
         self.written.append(path)
 
     def _show(self) -> None:
@@ -252,10 +252,10 @@ def active_particles(context: bpy.types.Context) -> bpy.types.Mesh | None:
     return item.data if item is not None and has_surface_particles(item.data) else None
 
 
-def _new_object(context: bpy.types.Context, count: int) -> bpy.types.Object:
+def _new_object(context: bpy.types.Context, particles: int) -> bpy.types.Object:
     """An object with surface particles, active and selected alone."""
     mesh = bpy.data.meshes.new("Surface Particles")
-    mesh.meniscus.use_surface_particles, mesh.meniscus.count = True, count
+    mesh.meniscus.use_surface_particles, mesh.meniscus.particles = True, particles
     item = bpy.data.objects.new(mesh.name, mesh)
     # The particles are in world space.
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
+import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import bpy
 from bpy.props import (
@@ -23,10 +24,12 @@ from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES
 from ..fluid.tracing import Tracing
+from ..render.particle_settings import CELL_SHARE, COUNT, DISPERSES, FILLS_GAPS, STEPS
 from ..render.registry import method_infos
-from ..render.surface_particles import SurfaceParticles
+from ..render.settings import Setting
 from .changes import note_display, note_source
 
+Update = Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]
 Item = tuple[str, str, str]
 NumberedItem = tuple[str, str, str, int]
 
@@ -50,6 +53,17 @@ def stable_items(items: Iterable[Item]) -> list[NumberedItem]:
     A .blend file holds the number of an item, so that numbers by order would change their meaning with each new item.
     """
     return [(name, label, description, zlib.crc32(name.encode()) & 0x7FFFFFFF) for name, label, description in items]
+
+
+_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+
+
+def setting_property(setting: Setting, update: Update | None = None) -> Any:
+    """The property that holds a setting; `update` is called by Blender when it is set."""
+    ends = {"min": setting.minimum, "max": setting.maximum}
+    limits = {name: end for name, end in ends.items() if math.isfinite(end)}
+    make = _KINDS[type(setting.default)]
+    return make(name=setting.label, description=setting.description, default=setting.default, update=update, **limits)
 
 
 class MENISCUS_PG_object(bpy.types.PropertyGroup):
@@ -151,9 +165,6 @@ def _update_particles(owner: bpy.types.PropertyGroup, _context: bpy.types.Contex
     owner.id_data.update_tag()
 
 
-_PARTICLES = inspect.signature(SurfaceParticles).parameters
-
-
 class MENISCUS_PG_mesh(bpy.types.PropertyGroup):
     """Surface particles of the scene's fluid, as the points of a mesh."""
 
@@ -167,58 +178,18 @@ class MENISCUS_PG_mesh(bpy.types.PropertyGroup):
         name="Live",
         description="Bring the particles up to date whenever the fluid or the frame changes",
         default=True,
-        options=set(),
         update=_update_particles,
     )
-    count: IntProperty(
-        name="Particles",
-        description="How many there are at most",
-        default=_PARTICLES["count"].default,
-        min=1,
-        max=1 << 24,
-        soft_max=1 << 20,
-        options=set(),
-        update=_update_particles,
-    )
-    steps: IntProperty(
-        name="Steps",
-        description="Steps of repulsion in each frame: more spread the particles more evenly",
-        default=_PARTICLES["steps"].default,
-        min=0,
-        max=1000,
-        soft_max=32,
-        options=set(),
-        update=_update_particles,
-    )
-    cell_share: FloatProperty(
-        name="Cell Size",
-        description="Of the grid in which balls are looked up, as a share of a ball's diameter; it changes the time alone",
-        default=_PARTICLES["cell_share"].default,
-        min=0.05,
-        max=1.0,
-        options=set(),
-        update=_update_particles,
-    )
-    use_dispersion: BoolProperty(
-        name="Dispersion",
-        description="Let particles leave dense places for thin ones at once, with a new id",
-        default=_PARTICLES["disperses"].default,
-        options=set(),
-        update=_update_particles,
-    )
-    use_gap_filling: BoolProperty(
-        name="Fill Gaps",
-        description="Give places without particles some at once, new droplets too",
-        default=_PARTICLES["fills_gaps"].default,
-        options=set(),
-        update=_update_particles,
-    )
+    particles: setting_property(COUNT, _update_particles)
+    steps: setting_property(STEPS, _update_particles)
+    cell_share: setting_property(CELL_SHARE, _update_particles)
+    disperses: setting_property(DISPERSES, _update_particles)
+    fills_gaps: setting_property(FILLS_GAPS, _update_particles)
     seed: IntProperty(
         name="Seed",
         description="Another number, another spread",
-        default=_PARTICLES["seed"].default,
+        default=0,
         min=0,
-        options=set(),
         update=_update_particles,
     )
     bake_folder: StringProperty(
@@ -226,7 +197,6 @@ class MENISCUS_PG_mesh(bpy.types.PropertyGroup):
         description="Where a bake writes its files, one for each frame",
         default="//surface_particles/",
         subtype="DIR_PATH",
-        options=set(),
     )
     baked_files: StringProperty(
         name="Baked Files",

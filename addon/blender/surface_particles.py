@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 import numpy as np
@@ -20,10 +21,11 @@ from ..fluid.balls import Balls
 from ..fluid.errors import InputError, MeniscusError
 from ..fluid.field import Field
 from ..render.particle_follower import ParticleFollower
-from ..render.surface_particles import ParticleCloud, SurfaceParticles
+from ..render.particle_settings import SIMULATION_SETTINGS, simulation_options
+from ..render.surface_particles import SurfaceParticles
 from .baked_particles import baked_path, read_particles
 from .changes import CHANGES
-from .particle_mesh import has_surface_particles, put_particles
+from .particle_mesh import Columns, columns_of, has_surface_particles, no_particles, put_particles
 from .preferences import threads_of
 from .read_scene import frame_seconds, read_field, read_fluid, scene_seconds
 from .scene_balls import same_balls
@@ -32,25 +34,13 @@ from .visible_sources import NoSourceError
 NO_BALLS = "The fluid has no ball at this frame, so there are no surface particles"
 NO_SURFACE = "The fluid has no surface, because its density reaches the isovalue nowhere: lower the isovalue"
 
-_NOTHING = ParticleCloud(*(np.empty((0, 3), np.float32) for _ in range(3)), np.empty(0, np.float32), np.empty(0, np.uint32))
-
 
 class FollowedFluid:
     """Surface particles of a mesh's settings, brought from frame to frame of a scene."""
 
     def __init__(self, mesh: bpy.types.Mesh) -> None:
-        settings = mesh.meniscus
         self.options = options_of(mesh)
-        self._follower = ParticleFollower(
-            SurfaceParticles(
-                settings.count,
-                cell_share=settings.cell_share,
-                steps=settings.steps,
-                disperses=settings.use_dispersion,
-                fills_gaps=settings.use_gap_filling,
-                seed=settings.seed,
-            )
-        )
+        self._follower = ParticleFollower(SurfaceParticles(**self.options))
         self._shown: tuple[Balls, Field] | None = None
 
     def go_to(self, depsgraph: bpy.types.Depsgraph, *, viewport: bool) -> bool:
@@ -74,9 +64,9 @@ class FollowedFluid:
         return before is None or before[0] is not balls or before[1] != field
 
     @property
-    def cloud(self) -> ParticleCloud:
-        """The particles."""
-        return self._follower.particles.cloud
+    def columns(self) -> Columns:
+        """What the mesh is to have of the particles."""
+        return columns_of(self._follower.particles.cloud)
 
     @property
     def problem(self) -> str:
@@ -86,19 +76,11 @@ class FollowedFluid:
         return NO_SURFACE if self._shown is not None and len(self._shown[0]) else NO_BALLS
 
 
-def options_of(mesh: bpy.types.Mesh) -> Hashable:
-    """What makes other particles where it changes."""
+def options_of(mesh: bpy.types.Mesh) -> dict[str, Any]:
+    """The arguments of :class:`surface_particles.SurfaceParticles` that a mesh's settings say."""
     settings = mesh.meniscus
-    return (
-        *(
-            settings.count,
-            settings.cell_share,
-            settings.steps,
-            settings.use_dispersion,
-            settings.use_gap_filling,
-            settings.seed,
-        ),
-    )
+    values = {setting.name: getattr(settings, setting.name) for setting in SIMULATION_SETTINGS}
+    return {**simulation_options(values), "seed": settings.seed}
 
 
 def _with_finite_velocities(balls: Balls) -> Balls:
@@ -167,7 +149,7 @@ class Clouds:
                 problem = _show(mesh, depsgraph, shown)
             except NoSourceError as error:
                 shown.fluid = None
-                put_particles(mesh, _NOTHING)
+                put_particles(mesh, no_particles())
                 problem = str(error)
             except MeniscusError as error:
                 problem = str(error)
@@ -206,7 +188,7 @@ CLOUDS = Clouds()
 def _moment(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Hashable:
     """What a mesh's particles depend on."""
     settings, scene = mesh.meniscus, depsgraph.scene
-    source = settings.baked_files or (settings.use_live, options_of(mesh), CHANGES.revision, read_field(scene))
+    source = settings.baked_files or (settings.use_live, *options_of(mesh).values(), CHANGES.revision, read_field(scene))
     return source, scene_seconds(scene)
 
 
@@ -223,8 +205,10 @@ def _show(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Shown) -
 def _show_live(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph, shown: _Shown) -> str:
     if shown.fluid is None or shown.fluid.options != options_of(mesh):
         shown.fluid = FollowedFluid(mesh)
-    if shown.fluid.go_to(depsgraph, viewport=depsgraph.mode == "VIEWPORT") or not shown.is_whole:
-        put_particles(mesh, shown.fluid.cloud)
+    # Without viewports whatever is evaluated is for renders, also the graph that the command line reads.
+    is_for_viewport = depsgraph.mode == "VIEWPORT" and not bpy.app.background
+    if shown.fluid.go_to(depsgraph, viewport=is_for_viewport) or not shown.is_whole:
+        put_particles(mesh, shown.fluid.columns)
     return shown.fluid.problem
 
 

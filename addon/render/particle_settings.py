@@ -39,7 +39,10 @@ EXACT = Setting(
     True,
 )
 
-PARTICLE_SETTINGS = (COUNT, STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS, FOLLOWS, EXACT)
+SIMULATION_SETTINGS = (COUNT, STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS)
+"""Those that :func:`simulation_options` reads."""
+
+PARTICLE_SETTINGS = (*SIMULATION_SETTINGS, FOLLOWS, EXACT)
 
 
 def simulation_options(settings: Mapping[str, Value]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ def mesh(new_file, fluid):
         item.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     with shown.override():
-        assert bpy.ops.meniscus.surface_particles_add(count=200) == {"FINISHED"}
+        assert bpy.ops.meniscus.surface_particles_add(particles=200) == {"FINISHED"}
         bpy.ops.ed.undo_push(message="Add Surface Particles")
     turns(3)
     yield particles()
@@ -148,12 +148,37 @@ def test_a_render_in_the_interface_shows_its_frames_and_leaves_that_of_the_viewp
     wait_until(lambda: abs(height()) < 0.1, "the particles of the viewport's frame")
 
 
+def test_a_render_shows_what_renders_show_and_the_viewport_its_own(mesh, fluid):
+    scene, heights = bpy.context.scene, []
+    other = add_points(scene.collection, "Other", [(0, 0, 8), (1.0, 0, 8)], radius=1.0)
+    other.hide_render = True
+    with fluid.prepare().override():
+        bpy.data.objects["Drop"].hide_set(True)
+    wait_until(lambda: abs(height() - 8.0) < 0.1, "the particles of the viewport")
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.cycles.use_denoising = False
+    scene.render.resolution_x, scene.render.resolution_y = 32, 24
+
+    def note(*_):
+        heights.append(height())
+
+    bpy.app.handlers.render_post.append(note)
+    try:
+        with fluid.prepare().override():
+            assert bpy.ops.render.render("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+        wait_until(lambda: heights and not bpy.app.is_job_running("RENDER"), "the render", seconds=60)
+    finally:
+        bpy.app.handlers.render_post.remove(note)
+    assert heights == [pytest.approx(0.0, abs=0.1)]
+    wait_until(lambda: abs(height() - 8.0) < 0.1, "the particles of the viewport")
+
+
 def test_the_panel_draws(drawn_panels, fluid, new_file):
     shown = fluid.prepare()
     shown.space.show_region_ui = True
     add_points(bpy.context.scene.collection, "Drop", [(0, 0, 0)], radius=1.0)
     with shown.override():
-        bpy.ops.meniscus.surface_particles_add(count=50)
+        bpy.ops.meniscus.surface_particles_add(particles=50)
     bpy.context.scene.render.use_lock_interface = False
     properties = next(area for area in shown.window.screen.areas if area.type == "PROPERTIES")
     turns(3)
