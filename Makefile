@@ -5,7 +5,7 @@ HOSTS := bpy-4.2 bpy-4.5 bpy-5.0 bpy-5.2 blender-4.3 blender-5.2 blender-own \
 	blender-4.3-window blender-5.2-window blender-5.2-vulkan blender-own-window
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo composite test test-fast fuzz bench bench-peers bench-pictures bench-clusters bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-van-kooten bench-light bench-scaling lint format extension lock clean $(HOSTS)
+.PHONY: help setup demo composite foam test test-fast fuzz bench bench-peers bench-pictures bench-clusters bench-viewport bench-export bench-gourmel bench-methods bench-mishima bench-mueller bench-van-kooten bench-light bench-scaling lint format extension lock clean $(HOSTS)
 
 help: ## Show this list
 	@grep -hE '^[$$a-zA-Z()-]+:.*## ' Makefile | sed -e 's/$$(HOSTS)/HOST/' -e 's/:.*## /\t/' | expand -t 16
@@ -20,6 +20,9 @@ demo: setup ## Bake a dam break, render frames of it headless, write EXR files a
 
 composite: setup ## Lay the dam break over a scene of Cycles in the compositor, write out/composite.png
 	@$(VENV) -m meniscus.samples.composite
+
+foam: setup ## Render the dam break with foam on its surface particles, write out/foam.png
+	@$(VENV) -m meniscus.samples.foam
 
 test: setup ## Run all tests, in every Blender there is (BLENDER=/path adds your own)
 	@$(VENV) tools/run_tests.py

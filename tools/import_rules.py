@@ -25,6 +25,9 @@ FOR_METHODS = (
     "addon/render/tree_builder",
     "addon/render/neighbours",
     "addon/render/glyphs",
+    "addon/render/surface_particles",
+    "addon/render/particle_follower",
+    "addon/render/particle_settings",
 )
 
 

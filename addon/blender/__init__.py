@@ -14,8 +14,10 @@ _SUBMODULES = (
     "operators",
     "engine",
     "export",
+    "particle_operators",
     "panels",
     "changes",
+    "surface_particles",
     "command_line",
     "viewport",
 )

@@ -7,6 +7,8 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from .particle_mesh import has_surface_particles
+
 _OBJECTS_WITHOUT_BALLS = {"CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER", "ARMATURE", "LATTICE"}
 """Types of objects that supply no balls; where one moves something that does, Blender tells of that too."""
 
@@ -79,6 +81,8 @@ def _note_all(*_: object) -> None:
 def _note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         item = update.id
+        if _shows_particles(item):
+            continue
         if isinstance(item, bpy.types.Object):
             if item.type not in _OBJECTS_WITHOUT_BALLS:
                 CHANGES.revision += 1
@@ -86,6 +90,12 @@ def _note_updates(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> No
         elif isinstance(item, _IDS_WITH_BALLS) and not _is_setting(update):
             CHANGES.revision += 1
             CHANGES.structure += isinstance(item, (bpy.types.Scene, bpy.types.Collection))
+
+
+def _shows_particles(item: bpy.types.ID) -> bool:
+    """Whether it shows surface particles: these depend on the fluid, and the fluid not on them."""
+    own = item.original
+    return has_surface_particles(own.data if isinstance(own, bpy.types.Object) else own)
 
 
 def _is_setting(update: bpy.types.DepsgraphUpdate) -> bool:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty
+from bpy.props import PointerProperty
 
 from ..render.method import MethodInfo
 from ..render.method_choice import MethodChoice
@@ -14,9 +13,7 @@ from ..render.registry import method_info, method_infos
 from ..render.settings import Setting, Value
 from .changes import note_display
 from .preferences import backend_of
-from .properties import MENISCUS_PG_scene
-
-_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+from .properties import MENISCUS_PG_scene, setting_property
 
 _groups: list[type[bpy.types.PropertyGroup]] = []
 """Those that are registered, the one that holds the others last."""
@@ -77,7 +74,8 @@ def _plain(value: Value, setting: Setting) -> Value:
 
 
 def _group_of(info: MethodInfo) -> type[bpy.types.PropertyGroup]:
-    return _registered(info.name, f"Settings of {info.label}", {setting.name: _property(setting) for setting in info.settings})
+    properties = {setting.name: setting_property(setting, note_display) for setting in info.settings}
+    return _registered(info.name, f"Settings of {info.label}", properties)
 
 
 def _registered(name: str, description: str, properties: dict[str, Any]) -> type[bpy.types.PropertyGroup]:
@@ -86,10 +84,3 @@ def _registered(name: str, description: str, properties: dict[str, Any]) -> type
     bpy.utils.register_class(group)
     _groups.append(group)
     return group
-
-
-def _property(setting: Setting) -> Any:
-    ends = {"min": setting.minimum, "max": setting.maximum}
-    limits = {name: end for name, end in ends.items() if math.isfinite(end)}
-    make = _KINDS[type(setting.default)]
-    return make(name=setting.label, description=setting.description, default=setting.default, update=note_display, **limits)

@@ -13,11 +13,14 @@ from bl_ui.utils import PresetPanel
 from ..fluid.image import RenderInfo
 from ..fluid.look import LOOK_STYLES
 from ..fluid.passes import PASSES
+from ..render.particle_settings import SIMULATION_SETTINGS
 from .compositing import fluid_scene_of
 from .engine_name import ENGINE
 from .method_settings import group_of
+from .particle_operators import active_particles
 from .presets import PRESETS
 from .sources import active_source, has_sources, source_flags
+from .surface_particles import CLOUDS
 from .texture_sharing import SHARING
 from .version_update import CURRENT_VERSION
 from .view_layer_passes import BLENDER_SWITCHES
@@ -219,6 +222,25 @@ class MENISCUS_PT_sidebar_quality(_SidebarPanel, bpy.types.Panel):
         layout.prop(context.scene.meniscus, "use_preview_tracing")
 
 
+class MENISCUS_PT_sidebar_particles(_SidebarPanel, bpy.types.Panel):
+    """Points on the surface, as data."""
+
+    bl_label = "Surface Particles"
+    bl_parent_id = "MENISCUS_PT_sidebar"
+    bl_options: ClassVar[set[str]] = _CLOSED
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_sources(context.scene)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        mesh = active_particles(context)
+        if mesh is None:
+            self.layout.operator("meniscus.surface_particles_add", icon="POINTCLOUD_DATA")
+        else:
+            _draw_particles(self.layout, context.scene, mesh)
+
+
 class MENISCUS_PT_sidebar_statistics(_SidebarPanel, bpy.types.Panel):
     """How the newest image of a viewport came about."""
 
@@ -259,7 +281,7 @@ class MENISCUS_PT_object(_FluidPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.object is not None
+        return context.object is not None and active_particles(context) is None
 
 
 class MENISCUS_PT_particles(_FluidPanel, bpy.types.Panel):
@@ -279,7 +301,23 @@ class MENISCUS_PT_data(_FluidPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.object is not None and context.object.type in ("MESH", "POINTCLOUD", "CURVES", "CURVE")
+        has_points = context.object is not None and context.object.type in ("MESH", "POINTCLOUD", "CURVES", "CURVE")
+        return has_points and active_particles(context) is None
+
+
+class MENISCUS_PT_particle_data(_PropertiesPanel, bpy.types.Panel):
+    """Surface particles beside the other settings of their mesh."""
+
+    bl_label = "Surface Particles"
+    bl_context = "data"
+    bl_options: ClassVar[set[str]] = set()
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return active_particles(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_particles(self.layout, context.scene, active_particles(context))
 
 
 class MENISCUS_PT_scene(_PropertiesPanel, bpy.types.Panel):
@@ -472,6 +510,24 @@ def _draw_tracing(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     occlusion.prop(settings, "tracing_occlusion_distance")
 
 
+def _draw_particles(layout: bpy.types.UILayout, scene: bpy.types.Scene, mesh: bpy.types.Mesh) -> None:
+    settings = mesh.meniscus
+    if problem := CLOUDS.problem_of(mesh):
+        _draw_text(layout, problem, "ERROR")
+    live = _split(layout).column()
+    live.enabled = not settings.baked_files
+    for name in ("use_live", *(setting.name for setting in SIMULATION_SETTINGS), "seed", "bake_folder"):
+        live.prop(settings, name)
+    if settings.baked_files:
+        layout.label(text=f"Frames {settings.baked_start} to {settings.baked_end} are baked.", icon="CHECKMARK")
+        layout.operator("meniscus.surface_particles_free")
+    else:
+        layout.operator("meniscus.surface_particles_bake", text="Bake")
+    if not scene.render.use_lock_interface:
+        _draw_text(layout, "Renders change the particles: lock the interface, or Blender may crash.", "ERROR")
+        layout.prop(scene.render, "use_lock_interface")
+
+
 def _draw_problem(layout: bpy.types.UILayout) -> None:
     if STATUS.problem:
         box = layout.box()
@@ -545,10 +601,12 @@ _CLASSES = (
     MENISCUS_PT_sidebar_tracing,
     MENISCUS_PT_sidebar_surface,
     MENISCUS_PT_sidebar_quality,
+    MENISCUS_PT_sidebar_particles,
     MENISCUS_PT_sidebar_statistics,
     MENISCUS_PT_object,
     MENISCUS_PT_particles,
     MENISCUS_PT_data,
+    MENISCUS_PT_particle_data,
     MENISCUS_PT_scene,
     MENISCUS_PT_compositing,
     MENISCUS_PT_sampling,

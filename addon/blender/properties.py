@@ -1,9 +1,11 @@
-"""The settings that are saved in the .blend file: ``object.meniscus`` and ``scene.meniscus``."""
+"""The settings that are saved in the .blend file: ``object.meniscus``, ``mesh.meniscus`` and ``scene.meniscus``."""
 
 from __future__ import annotations
 
+import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import bpy
 from bpy.props import (
@@ -22,9 +24,12 @@ from ..fluid.kernels import KERNELS
 from ..fluid.look import LOOK_STYLES, Look
 from ..fluid.passes import PASSES
 from ..fluid.tracing import Tracing
+from ..render.particle_settings import CELL_SHARE, COUNT, DISPERSES, FILLS_GAPS, STEPS
 from ..render.registry import method_infos
+from ..render.settings import Setting
 from .changes import note_display, note_source
 
+Update = Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]
 Item = tuple[str, str, str]
 NumberedItem = tuple[str, str, str, int]
 
@@ -48,6 +53,17 @@ def stable_items(items: Iterable[Item]) -> list[NumberedItem]:
     A .blend file holds the number of an item, so that numbers by order would change their meaning with each new item.
     """
     return [(name, label, description, zlib.crc32(name.encode()) & 0x7FFFFFFF) for name, label, description in items]
+
+
+_KINDS = {bool: BoolProperty, int: IntProperty, float: FloatProperty}
+
+
+def setting_property(setting: Setting, update: Update | None = None) -> Any:
+    """The property that holds a setting; `update` is called by Blender when it is set."""
+    ends = {"min": setting.minimum, "max": setting.maximum}
+    limits = {name: end for name, end in ends.items() if math.isfinite(end)}
+    make = _KINDS[type(setting.default)]
+    return make(name=setting.label, description=setting.description, default=setting.default, update=update, **limits)
 
 
 class MENISCUS_PG_object(bpy.types.PropertyGroup):
@@ -142,6 +158,54 @@ class MENISCUS_PG_object(bpy.types.PropertyGroup):
         default="Color",
         update=note_source,
     )
+
+
+def _update_particles(owner: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Have Blender evaluate a mesh, so that the handler brings its surface particles up to date."""
+    owner.id_data.update_tag()
+
+
+class MENISCUS_PG_mesh(bpy.types.PropertyGroup):
+    """Surface particles of the scene's fluid, as the points of a mesh."""
+
+    use_surface_particles: BoolProperty(
+        name="Surface Particles",
+        description="Whether the points of this mesh are the surface particles of the scene's fluid",
+        default=False,
+        options={"HIDDEN"},
+    )
+    use_live: BoolProperty(
+        name="Live",
+        description="Bring the particles up to date whenever the fluid or the frame changes",
+        default=True,
+        update=_update_particles,
+    )
+    particles: setting_property(COUNT, _update_particles)
+    steps: setting_property(STEPS, _update_particles)
+    cell_share: setting_property(CELL_SHARE, _update_particles)
+    disperses: setting_property(DISPERSES, _update_particles)
+    fills_gaps: setting_property(FILLS_GAPS, _update_particles)
+    seed: IntProperty(
+        name="Seed",
+        description="Another number, another spread",
+        default=0,
+        min=0,
+        update=_update_particles,
+    )
+    bake_folder: StringProperty(
+        name="Folder",
+        description="Where a bake writes its files, one for each frame",
+        default="//surface_particles/",
+        subtype="DIR_PATH",
+    )
+    baked_files: StringProperty(
+        name="Baked Files",
+        description="Which files are shown, #### is the frame number; none where the particles are live",
+        options={"HIDDEN"},
+        update=_update_particles,
+    )
+    baked_start: IntProperty(name="Start", description="First frame that is baked", options={"HIDDEN"})
+    baked_end: IntProperty(name="End", description="Last frame that is baked", options={"HIDDEN"})
 
 
 class MENISCUS_PG_scene(bpy.types.PropertyGroup):
@@ -472,6 +536,7 @@ class MENISCUS_PG_view_layer(bpy.types.PropertyGroup):
 
 _OWNERS = (
     (bpy.types.Object, MENISCUS_PG_object),
+    (bpy.types.Mesh, MENISCUS_PG_mesh),
     (bpy.types.Scene, MENISCUS_PG_scene),
     (bpy.types.ViewLayer, MENISCUS_PG_view_layer),
 )

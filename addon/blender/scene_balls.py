@@ -61,7 +61,12 @@ class SceneBalls:
         now = self._changes.revision, tuple(depsgraph.scene.meniscus.color), uses_materials
         if entry is None or entry.read_at != now:
             fluid = self._read(depsgraph, space, uses_materials)
-            if fluid is not None and entry is not None and entry.fluid is not None and _is_same(fluid.balls, entry.fluid.balls):
+            if (
+                fluid is not None
+                and entry is not None
+                and entry.fluid is not None
+                and same_balls(fluid.balls, entry.fluid.balls)
+            ):
                 fluid = replace(fluid, balls=entry.fluid.balls)
             self._entries[key] = entry = _Entry(now, fluid)
         return entry.fluid
@@ -95,7 +100,8 @@ def _any_source() -> bool:
     return any(item.meniscus.use_fluid for item in bpy.data.objects)
 
 
-def _is_same(balls: Balls, other: Balls) -> bool:
+def same_balls(balls: Balls, other: Balls) -> bool:
+    """Whether all that balls carry is the same."""
     pairs = ((getattr(balls, name), getattr(other, name)) for name in _ARRAYS)
     return balls.dropped == other.dropped and all(
         mine is theirs if mine is None or theirs is None else np.array_equal(mine, theirs) for mine, theirs in pairs

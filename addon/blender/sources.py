@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .changes import CHANGES
+from .particle_mesh import has_surface_particles
 from .read_particles import has_particle_systems
 
 HIDDEN_DISPLAY = "meniscus_display_method"
@@ -43,6 +44,8 @@ def problem_of(item: bpy.types.Object) -> str:
     """Why an object cannot become a source by itself, as the end of a sentence; empty where it can."""
     if item.library is not None:
         return "is linked: make a library override of it"
+    if has_surface_particles(item.data):
+        return "shows the surface particles of the fluid, and cannot be fluid itself"
     if has_particle_systems(item):
         return ""
     if item.type == "POINTCLOUD" or any(modifier.type == "NODES" for modifier in item.modifiers):

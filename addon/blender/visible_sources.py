@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ..fluid.errors import InputError
 from .moving import place_may_move
+from .particle_mesh import has_surface_particles
 
 
 class NoSourceError(InputError):
@@ -92,7 +93,8 @@ def visible_sources(
         A render shows one that the viewport's dependency graph does not hold.
     """
     evaluated = (item for item in depsgraph.ids if isinstance(item, bpy.types.Object))
-    fluid = {item.as_pointer() for item in evaluated if settings_of(item, depsgraph).use_fluid}
+    used = (item for item in evaluated if settings_of(item, depsgraph).use_fluid)
+    fluid = {item.as_pointer() for item in used if not has_surface_particles(item.original.data)}
     if not fluid and not any(item.meniscus.use_fluid for item in depsgraph.scene.objects):
         raise NoSourceError(
             "No object supplies balls: enable Meniscus in the object properties of one with particles or points"

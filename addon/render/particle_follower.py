@@ -72,12 +72,14 @@ class ParticleFollower(Generic[Particles]):
     ) -> ParticleReport:
         """Bring the particles to a frame; nothing happens for the balls that they are on already.
 
-        They follow the fluid where the frame before is up to `LONGEST_STEP` seconds away, for samples of motion blur go to and fro,
-        and begin anew after jumps and cuts. `seconds` is by the clock of the scene; None begins anew. The errors are those of
+        They follow the fluid where the frame before is up to `LONGEST_STEP` seconds away, to and fro as samples of motion blur
+        are, and begin anew after jumps and cuts. `seconds` is by the clock of the scene; None begins anew. The errors are those of
         :meth:`surface_particles.SurfaceParticles.seed`.
         """
         shown, before = self._shown, self._seconds
         if shown is not None and shown[0] is balls and shown[1] == field:
+            # Fluid that rests is followed when it goes on.
+            self._seconds = seconds
             return ParticleReport(0, 0, 0)
         # What is interrupted leaves nothing to follow.
         self._shown = self._seconds = None
@@ -128,9 +130,7 @@ class ShownParticles(Generic[Particles]):
         if not len(self.particles) or self.particles.reach <= TOO_SPARSE:
             return ()
         count = len(self.particles)
-        return (
-            f"{count} surface particles are too few for this fluid, parts of it are missing: raise their number, or set it to 0",
-        )
+        return (f"{count} surface particles are too few for this fluid, parts of it are missing: raise their number, or set 0",)
 
 
 def particles_at(request: Request, name: str, make: Callable[[], Particles]) -> ShownParticles[Particles]:

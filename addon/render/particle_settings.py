@@ -19,7 +19,7 @@ STEPS = Setting("steps", "Steps", "Steps of repulsion in each frame; more spread
 CELL_SHARE = Setting(
     "cell_share",
     "Cell Size",
-    "Side of the spatial hash's cells as a share of a ball's diameter: smaller cells take more memory and time to fill, and less to read",
+    "Side of the spatial hash's cells by a ball's diameter: smaller ones take longer to fill and more memory, less to read",
     1 / 3,
     0.1,
     1.0,
@@ -39,7 +39,10 @@ EXACT = Setting(
     True,
 )
 
-PARTICLE_SETTINGS = (COUNT, STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS, FOLLOWS, EXACT)
+SIMULATION_SETTINGS = (COUNT, STEPS, CELL_SHARE, DISPERSES, FILLS_GAPS)
+"""Those that :func:`simulation_options` reads."""
+
+PARTICLE_SETTINGS = (*SIMULATION_SETTINGS, FOLLOWS, EXACT)
 
 
 def simulation_options(settings: Mapping[str, Value]) -> dict[str, Any]:

@@ -203,3 +203,60 @@ def test_the_dam_break_is_composited_over_cycles(sample, empty_scene, tmp_path):
     red, blue = pixels[..., 0], pixels[..., 2]
     assert (blue > 3 * red).mean() > 0.05, "water"
     assert (red > 2 * blue).mean() > 0.01, "what stands in it and before it"
+
+
+def test_foam_lies_where_the_water_is_fast_and_bubbles_stay_what_they_are(sample, empty_scene):
+    sample("dam_break").build(empty_scene, spacing=0.12, frame_end=14)
+    foam = sample("foam")
+    empty_scene.frame_set(12)
+    item = foam.add_foam(empty_scene, count=4000)
+    sizes = []
+    for frame in (12, 13):
+        empty_scene.frame_set(frame)
+        centers, radii = bubbles_of(item)
+        points, ids = values_of(item.data, "position", "vector"), values_of(item.data, "id", "value")
+        nearest = np.array([np.argmin(np.sum((points - center) ** 2, axis=1)) for center in centers])
+        assert np.allclose(points[nearest], centers, atol=1e-4)
+        speeds = np.linalg.norm(values_of(item.data, "velocity", "vector"), axis=1)
+        assert 100 < len(centers) < len(points) / 2
+        assert speeds[nearest].min() > foam.SLOW
+        assert np.median(speeds[nearest]) > 1.2 * np.median(speeds)
+        assert values_of(item.data, "surface_normal", "vector")[nearest, 2].min() > foam.STEEP
+        assert foam.SIZES[0] - 1e-5 < radii.min() < np.median(radii) < 0.5 * sum(foam.SIZES)
+        sizes.append(dict(zip(ids[nearest].tolist(), radii.tolist(), strict=True)))
+    stayed = sizes[0].keys() & sizes[1].keys()
+    assert len(stayed) > 50
+    assert all(sizes[0][number] == pytest.approx(sizes[1][number], rel=1e-3) for number in stayed)
+
+
+def bubbles_of(item):
+    """Centres (N, 3) and radii (N,) of the icospheres that an object's nodes make."""
+    data = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    corners = values_of(data, "position", "vector").reshape(-1, 42, 3)
+    centers = corners.mean(axis=1)
+    return centers, np.linalg.norm(corners - centers[:, None], axis=2).mean(axis=1)
+
+
+def values_of(mesh, name, value):
+    """An attribute on points."""
+    data = mesh.attributes[name].data
+    found = np.empty(len(data) * (3 if value == "vector" else 1), np.int32 if name == "id" else np.float32)
+    data.foreach_get(value, found)
+    return found.reshape(-1, 3) if value == "vector" else found
+
+
+def test_foam_is_rendered_white_on_water(sample, empty_scene, tmp_path):
+    sample("dam_break").build(empty_scene, spacing=0.15, frame_end=14)
+    foam = sample("foam")
+    foam.furnish(empty_scene, count=10_000)
+    empty_scene.render.resolution_percentage = 10
+    pictures = []
+    for hidden in (False, True):
+        empty_scene.objects["Foam"].hide_render = hidden
+        foam.render(empty_scene, tmp_path / "picture.png", 14, 2)
+        picture = bpy.data.images.load(str(tmp_path / "picture.png"), check_existing=False)
+        pictures.append(np.array(picture.pixels, np.float32).reshape(-1, 4)[:, :3].min(axis=1))
+        bpy.data.images.remove(picture)
+    lighter, darker = (np.mean(sign * (pictures[0] - pictures[1]) > 0.15) for sign in (1, -1))
+    assert lighter > 0.005
+    assert darker < 0.2 * lighter

@@ -61,6 +61,15 @@ def test_they_stay_where_they_are_on_the_same_balls():
     assert not np.array_equal(follower.particles.cloud.positions, before.positions)
 
 
+def test_they_follow_what_has_rested_for_long():
+    follower, balls = ParticleFollower(meniscus.SurfaceParticles(100)), balls_at(0.0)
+    for seconds in (0.0, 1.0, 2.0):
+        follower.go_to(balls, FIELD, seconds)
+    before = follower.particles.cloud
+    follower.go_to(balls_at(0.04), FIELD, 2.04)
+    assert kept(follower, before) > 0.8
+
+
 def test_they_begin_anew_after_what_was_interrupted(follower):
     def stop(_: float) -> None:
         raise CancelledError("stop")

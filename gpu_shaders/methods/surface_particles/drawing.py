@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 
 from ....addon.fluid.camera import Camera
 from ....addon.render.method import Request
@@ -102,7 +103,7 @@ class _Targets:
         gl.framebuffer([beyond]).clear(red=-_NOWHERE)
 
 
-def _depth_scale(camera: Camera, box: np.ndarray) -> float:
+def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
     """Of distances from the anchor's plane."""
     window = camera.window
     slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))

@@ -63,11 +63,11 @@ void put_attributes(vec3 point) {
     float density = 0.0, greatest = 0.0;
     vec3 color = vec3(0.0), velocity = vec3(0.0);
     int dominant = -1;
-    int levels = min(hash_levels(), MOST_LEVELS);
-    for (int level = 0; level < levels; level++) {
+    int count = hash_levels();
+    for (int level = 0; level < count; level++) {
         Bucket bucket = hash_find(level, point);
-        for (uint entry = bucket.begin; entry < bucket.end; entry++) {
-            int ball = hash_ball(entry, bucket);
+        for (uint i = 0u; i < bucket.count; i++) {
+            int ball = hash_ball(bucket, i);
             if (ball < 0)
                 continue;
             vec4 sphere = hash_sphere(ball), motion = texelFetch(motion_tx, hash_texel(uint(ball)), 0);

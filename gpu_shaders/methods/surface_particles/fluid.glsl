@@ -49,11 +49,11 @@ void fluid_add_ball(inout Sample found, inout vec2 sums, vec3 point, int ball) {
 Sample fluid_sample(vec3 point) {
     Sample found = Sample(0.0, vec3(0.0), 0.0, vec3(0.0), FLUID_NO_RADIUS, 0.0);
     vec2 sums = vec2(0.0);
-    int levels = min(hash_levels(), MOST_LEVELS);
-    for (int level = 0; level < levels; level++) {
+    int count = hash_levels();
+    for (int level = 0; level < count; level++) {
         Bucket bucket = hash_find(level, point);
-        for (uint entry = bucket.begin; entry < bucket.end; entry++) {
-            int ball = hash_ball(entry, bucket);
+        for (uint i = 0u; i < bucket.count; i++) {
+            int ball = hash_ball(bucket, i);
             if (ball >= 0)
                 fluid_add_ball(found, sums, point, ball);
         }

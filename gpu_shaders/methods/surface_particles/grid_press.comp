@@ -26,8 +26,8 @@ void main() {
     Pressure pressure = Pressure(vec3(0.0), 0.0, 0.0);
     if (place.w > 0.0) {
         vec3 normal = particle_normal(particle).xyz;
-        int levels = min(level_count, MOST_LEVELS);
-        for (int level = 0; level < levels; level++) {
+        int count = min(level_count, MOST_LEVELS);
+        for (int level = 0; level < count; level++) {
             ivec3 middle = grid_cell(place.xyz, level);
             for (int i = 0; i < 27; i++)
                 add_cell(pressure, middle + ivec3(i / 9, i / 3 % 3, i % 3) - 1, level, particle, place, normal);

@@ -14,7 +14,7 @@ const float HASH_FARTHEST_CELL = 1073741824.0;
 // What a point finds on a level: the entries of its bucket, of which those with its tag are of its own cell.
 struct Bucket {
     uint begin;
-    uint end;
+    uint count;
     uint tag;
 };
 
@@ -45,12 +45,12 @@ Bucket hash_find(int number, vec3 point) {
     ivec3 cell = ivec3(clamp(place, -HASH_FARTHEST_CELL, HASH_FARTHEST_CELL));
     uint bucket = level.z + hash_bucket(cell, level.y);
     uint begin = texelFetch(start_tx, hash_texel(bucket), 0).x, end = texelFetch(start_tx, hash_texel(bucket + 1u), 0).x;
-    return Bucket(level.w + begin, level.w + min(end, begin + MOST_ENTRIES), hash_tag(cell));
+    return Bucket(level.w + begin, min(end - begin, MOST_ENTRIES), hash_tag(cell));
 }
 
 // The ball of an entry, if it is one of the bucket's cell; else -1.
-int hash_ball(uint entry, Bucket bucket) {
-    uvec2 about = texelFetch(entry_tx, hash_texel(entry), 0).xy;
+int hash_ball(Bucket bucket, uint number) {
+    uvec2 about = texelFetch(entry_tx, hash_texel(bucket.begin + number), 0).xy;
     return about.y == bucket.tag ? int(about.x) : -1;
 }
 

@@ -16,11 +16,11 @@ layout(location = 1) out vec4 out_bend_across; // xy, xz, yz
 // The second derivatives of F at a point.
 mat3 second_derivatives(vec3 point) {
     mat3 sum = mat3(0.0);
-    int levels = min(hash_levels(), MOST_LEVELS);
-    for (int level = 0; level < levels; level++) {
+    int count = hash_levels();
+    for (int level = 0; level < count; level++) {
         Bucket bucket = hash_find(level, point);
-        for (uint entry = bucket.begin; entry < bucket.end; entry++) {
-            int ball = hash_ball(entry, bucket);
+        for (uint i = 0u; i < bucket.count; i++) {
+            int ball = hash_ball(bucket, i);
             if (ball < 0)
                 continue;
             vec4 sphere = hash_sphere(ball);

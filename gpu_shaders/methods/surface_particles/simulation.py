@@ -17,7 +17,6 @@ import numpy.typing as npt
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.field import Field
 from ....addon.fluid.kernels import PolynomialKernel
-from ....addon.render.native import let_interrupt
 from ....addon.render.surface_particles import ParticleCloud, ParticleReport, SurfaceParticles, adapted_reach
 from ...context import GpuContext
 from ...step import Step
@@ -31,6 +30,10 @@ Doubles = npt.NDArray[np.float64]
 
 PUSH = 0.1
 """How far pressure moves a particle in a step, in reaches; see native/core/src/surface_particles/mod.rs."""
+
+
+def _unwatched(_: float) -> None:
+    """Lets all work go on."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class GpuSurfaceParticles:
     def __len__(self) -> int:
         return 0 if self._state is None else self._state.count
 
-    def seed(self, balls: Balls, field: Field, *, threads: int = 0, watch: Watch = let_interrupt) -> ParticleReport:
+    def seed(self, balls: Balls, field: Field, *, threads: int = 0, watch: Watch = _unwatched) -> ParticleReport:
         """Begin anew, see :meth:`surface_particles.SurfaceParticles.seed`; DeviceError also where the driver has too little."""
         self._fluid = self._state = self._discs = None  # their memory may be needed
         anchor = _anchor(balls)
@@ -97,7 +100,7 @@ class GpuSurfaceParticles:
         return ParticleReport(0, placed, dispersed)
 
     def follow(
-        self, balls: Balls, field: Field, seconds: float, *, threads: int = 0, watch: Watch = let_interrupt
+        self, balls: Balls, field: Field, seconds: float, *, threads: int = 0, watch: Watch = _unwatched
     ) -> ParticleReport:
         """Follow the fluid, see :meth:`surface_particles.SurfaceParticles.follow`."""
         before, state = self._fluid, self._state
