@@ -12,8 +12,8 @@ Rows = npt.NDArray[np.float32] | npt.NDArray[np.int32] | npt.NDArray[np.uint32]
 
 
 def row_texture(gl: moderngl.Context, rows: Rows) -> moderngl.Texture:
-    """(M, components) of floats or integers of 32 bits as a texture with one texel a row, left to right and on the next line after
-    ROW_TEXTURE_WIDTH.
+    """(M, components) of floats or integers of 32 bits as a texture with one texel a row, left to right and on the next line
+    after ROW_TEXTURE_WIDTH.
     """
     lines = max(-(-len(rows) // ROW_TEXTURE_WIDTH), 1)
     padded = np.zeros((lines * ROW_TEXTURE_WIDTH, rows.shape[1]), rows.dtype)

@@ -73,8 +73,8 @@ class ParticleFollower(Generic[Particles]):
         """Bring the particles to a frame; nothing happens for the balls that they are on already.
 
         They follow the fluid where the frame before is up to `LONGEST_STEP` seconds away, to and fro as samples of motion blur
-        are, and begin anew after jumps and cuts. `seconds` is by the clock of the scene; None begins anew. The errors are those of
-        :meth:`surface_particles.SurfaceParticles.seed`.
+        are, and begin anew after jumps and cuts. `seconds` is by the clock of the scene; None begins anew. The errors are
+        those of :meth:`surface_particles.SurfaceParticles.seed`.
         """
         shown, before = self._shown, self._seconds
         if shown is not None and shown[0] is balls and shown[1] == field:

@@ -148,8 +148,9 @@ class SurfaceParticles:
         threads: int = 0,
         watch: Callable[[float], object] = native.let_interrupt,
     ) -> ParticleReport:
-        """Follow the fluid to these balls of `seconds` later, or earlier where that is negative, by the velocities of the balls before (equations 2 and 3).
+        """Follow the fluid to these balls of `seconds` later, or earlier where that is negative.
 
+        They go by the velocities of the balls before (equations 2 and 3).
         After a cut or a jump in time call :meth:`seed` instead. The errors are those of :meth:`seed`.
         """
         if not abs(seconds) <= MOST_SECONDS:

@@ -20,7 +20,7 @@ from .programs import THREADS, grid_programs, image_programs
 from .state import ParticleState, Pressures
 
 _MOST_LAYERS = 24
-"""Particles at one pixel that are told apart; those beyond are not pushed in this step, and in the next one the image is another."""
+"""Particles at one pixel that are told apart; others are not pushed in this step, and the next image is another."""
 
 _PIXELS_A_CELL = 5
 """Of the image: more tell particles apart better, fewer are drawn faster."""

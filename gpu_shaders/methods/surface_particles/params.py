@@ -6,7 +6,7 @@ from ....addon.render.particle_settings import PARTICLE_SETTINGS
 METHOD = MethodInfo(
     name="surface_particles",
     label="Surface Particles",
-    description="Points that spread over the surface and move with it, drawn as discs (van Kooten et al. 2007), on the graphics card",
+    description="Points that spread over the surface and move with it, drawn as discs, on the graphics card",
     backend="gpu",
     attributes=frozenset({"color", "velocity", "ball"}),
     gl_version=330,

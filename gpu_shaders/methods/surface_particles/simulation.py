@@ -1,8 +1,8 @@
 """Surface particles that move on the graphics processor.
 
 What happens in a frame is what :class:`surface_particles.SurfaceParticles` does, pass by pass and with the same numbers: the
-balls of the frame before carry the particles, they settle on the new surface, the native core fills gaps, and steps of repulsion and
-dispersion spread them.
+balls of the frame before carry the particles, they settle on the new surface, the native core fills gaps, and steps of
+repulsion and dispersion spread them.
 """
 
 from __future__ import annotations
