@@ -14,7 +14,7 @@ uniform sampler2D color_tx;
 #endif
 
 // How often a point is moved along its ray, and how far at most, in influence radii.
-const int FINISH_STEPS = 6;
+const int FINISH_STEPS = 12;
 const float FINISH_LONGEST_STEP = 0.1;
 
 // How far beyond the middle of what was tried the next round begins, in influence radii.
@@ -53,7 +53,7 @@ Place place_on(vec3 start, vec3 direction, float t, float side) {
         if (abs(missing) <= 1e-5 * slope * found.radius && rise > 0.0)
             return Place(true, t, -found.gradient / slope, radius);
         float longest = FINISH_LONGEST_STEP * found.radius;
-        t += clamp(missing / max(rise, 0.05 * slope), -longest, longest);
+        t += clamp(missing / max(rise, 0.01 * slope), -longest, longest);
     }
     return Place(false, t, vec3(0.0), radius);
 }
@@ -126,7 +126,8 @@ void main() {
         discard;
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
     vec3 start = scene_start(ray), direction = scene_direction(ray);
-    float t = front_distance(pixel) + texelFetch(way_sum_tx, pixel, 0).x / weight;
+    // From the nearest disc on no surface is passed over.
+    float t = front_distance(pixel) + (is_exact ? 0.0 : texelFetch(way_sum_tx, pixel, 0).x / weight);
     Place place = place_of(pixel, start, direction, t);
     float depth = place.t / ray.stretch;
     put_nothing();
