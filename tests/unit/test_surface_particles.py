@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from bench import van_kooten_2007, van_kooten_scenes
+from bench.van_kooten_scenes import fountain
 
 import meniscus
 from meniscus.addon.fluid.errors import InputError
+from meniscus.addon.render.particle_follower import ParticleFollower
 
 FIELD = meniscus.Field("wyvill", 0.2)
 RANDOM = np.random.default_rng(3)
@@ -73,3 +76,17 @@ def test_what_cannot_be_is_told_in_a_sentence():
         particles.seed(BALLS, meniscus.Field("mishima", 0.7))
     assert particles.seed(BALLS, meniscus.Field("wyvill", 1e9)).placed == 0
     assert len(particles.cloud.ids) == 0
+
+
+@pytest.mark.slow
+def test_particles_stay_on_a_fountain_through_a_hundred_frames():
+    follower = ParticleFollower(meniscus.SurfaceParticles(steps=10))
+    for frame in range(101):
+        balls = fountain(1.0 + frame / 24)
+        report = follower.go_to(balls, van_kooten_scenes.FIELD, 1.0 + frame / 24)
+        cloud = follower.particles.cloud
+        assert frame == 0 or report.placed < 0.3 * len(cloud.ids), "they should go on from frame to frame"
+        if frame % 25 == 0:
+            assert van_kooten_2007.distance_rms(cloud, balls) <= 0.01
+            assert van_kooten_2007.variation(cloud) <= 0.25
+            assert van_kooten_2007.covered(balls, cloud) >= 0.995
