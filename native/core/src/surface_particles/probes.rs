@@ -13,8 +13,8 @@ use crate::vectors::{along, difference, dot, plus};
 
 use super::fluid::{Fluid, SurfacePoint};
 
-/// Directions of a ball at least: the corners of an icosahedron would be as many.
-const FEWEST: usize = 12;
+/// Directions of a ball at least: a part of it that is seen between others is missed where it is smaller than their distance.
+const FEWEST: usize = 40;
 
 /// Directions of a ball at most.
 const MOST: usize = 1 << 16;
