@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
 from ..addon.fluid.camera import Camera
-from .camera_parts import camera_uniforms
+from .camera_parts import camera_uniforms, depth_scale
 
 
 def scene_camera_uniforms(box: npt.NDArray[np.floating], origin: npt.NDArray[np.float64], camera: Camera) -> dict[str, object]:
@@ -44,3 +45,14 @@ def first_depth(box: npt.NDArray[np.float64], camera: Camera) -> float:
     if not np.all(np.isfinite(box)):
         return camera.clip_start
     return min(max(float(np.min(box_depths(box, camera))), camera.clip_start), camera.clip_end)
+
+
+def scene_depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
+    """See :func:`camera_parts.depth_scale`: of distances along rays from the plane at which the camera begins, to all of a box
+    (2, 3) in world space.
+    """
+    window = camera.window
+    slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
+    stretch = math.hypot(1.0, *slopes) if camera.is_perspective else 1.0
+    farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
+    return depth_scale(max(farthest, 1e-30))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TypeVar, cast
 
 Kept = TypeVar("Kept")
 
@@ -24,7 +24,7 @@ class Sequence:
         if kept is None or known_key != key:
             kept = make()
             self._kept[name] = key, kept
-        return kept  # type: ignore[return-value]
+        return cast(Kept, kept)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -30,6 +31,12 @@ def load() -> Any:
             f"Meniscus' native core cannot be loaded ({error}): install the extension for your system, or run 'make setup'"
         ) from error
     return meniscus_native
+
+
+def device() -> str:
+    """The processor's architecture, and which of its instructions are used; the errors are those of :func:`load`."""
+    with translated_errors():
+        return f"CPU ({platform.machine()}), {load().simd_path()}"
 
 
 def fluid_arguments(balls: Balls, field: Field) -> tuple[Any, ...]:

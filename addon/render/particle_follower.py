@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -133,14 +133,16 @@ class ShownParticles(Generic[Particles]):
         return (f"{count} surface particles are too few for this fluid, parts of it are missing: raise their number, or set 0",)
 
 
-def particles_at(request: Request, name: str, make: Callable[[], Particles]) -> ShownParticles[Particles]:
+def particles_at(
+    request: Request, method: str, make: Callable[[], Particles], home: Hashable = None
+) -> ShownParticles[Particles]:
     """The surface particles of a request's time, which follow those of the image before in its sequence.
 
-    `name` is the method's; `make` makes particles for the request's settings. The errors are those of
-    :meth:`ParticleFollower.go_to`.
+    `method` is its name; `make` makes particles for the request's settings, at `home`, which is the OpenGL context where
+    there is one. The errors are those of :meth:`ParticleFollower.go_to`.
     """
-    key = tuple(sorted(request.settings.items()))
-    follower = request.instant.sequence.kept(name, key, lambda: ParticleFollower(make()))
+    key = home, *sorted(request.settings.items())
+    follower = request.instant.sequence.kept(method, key, lambda: ParticleFollower(make()))
     seconds = request.instant.seconds if request.settings[FOLLOWS.name] else None
     report = follower.go_to(request.balls, request.field, seconds, threads=request.threads, watch=request.watch)
     return ShownParticles(follower.particles, report)

@@ -6,6 +6,7 @@ import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -65,7 +66,7 @@ def query_table(plan: Plan) -> str:
     pressures = context.run(lambda: Pressures(context, state.count))
     spacing = float(np.median(cloud.spacings)) / (GLASS_REACH * GLASS_SPACING)
     kinds = [kind for kind in (ImageCrowd, GridCrowd) if kind is ImageCrowd or context.version >= 430]
-    crowds = {kind.__name__: context.run(lambda kind=kind: kind(context)) for kind in kinds}  # type: ignore[misc]
+    crowds: dict[str, Crowd] = {kind.__name__: context.run(partial(kind, context)) for kind in kinds}
 
     def search(crowd: Crowd, size: float) -> Callable[[], object]:
         reaches = Reaches(size * spacing, (GLASS_REACH * GLASS_SPACING,) * 2)

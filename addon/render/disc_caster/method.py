@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import platform
-
 from .. import native
 from ..method import Request, Surface, timed, unfilled_surface
 from ..particle_follower import particles_at
 from ..particle_settings import EXACT, simulation_options
 from ..surface_particles import SurfaceParticles
+from .params import METHOD
 
 
 class DiscCaster:
     """See :mod:`disc_caster`."""
 
-    def __init__(self) -> None:
-        self._native = native.load()
-
     @property
     def device(self) -> str:
-        """The processor's architecture, and which of its instructions are used."""
-        with native.translated_errors():
-            return f"CPU ({platform.machine()}), {self._native.simd_path()}"
+        """See :func:`native.device`."""
+        return native.device()
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`; the particles follow those of the image before in the request's sequence."""
         surface = unfilled_surface(request)
         with timed(surface.milliseconds, "particles"):
-            shown = particles_at(request, "disc_caster", lambda: SurfaceParticles(**simulation_options(request.settings)))
+            shown = particles_at(request, METHOD.name, lambda: SurfaceParticles(**simulation_options(request.settings)))
         with timed(surface.milliseconds, "draw"):
             shown.particles.draw(
                 request.balls,
@@ -43,4 +38,5 @@ class DiscCaster:
 
 def create() -> DiscCaster:
     """The method, ready to run; raises DeviceError where the native core is missing."""
+    native.load()
     return DiscCaster()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-
 import numpy as np
 
 from ...fluid.passes import DEPTH_BACKGROUND
@@ -20,9 +18,8 @@ class GlyphCaster:
 
     @property
     def device(self) -> str:
-        """The processor's architecture, and which of its instructions are used."""
-        with native.translated_errors():
-            return f"CPU ({platform.machine()}), {self._native.simd_path()}"
+        """See :func:`native.device`."""
+        return native.device()
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,9 +21,8 @@ class TileCaster:
 
     @property
     def device(self) -> str:
-        """The processor's architecture, and which of its instructions are used."""
-        with native.translated_errors():
-            return f"CPU ({platform.machine()}), {self._native.simd_path()}"
+        """See :func:`native.device`."""
+        return native.device()
 
     def find_surface(self, request: Request) -> Surface:
         """See :meth:`method.Method.find_surface`."""

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
 from ....addon.fluid.camera import Camera
 from ....addon.render.method import Request
-from ...camera_parts import depth_scale
 from ...context import GpuContext
 from ...image_cells import plain
 from ...occlusion import OcclusionQueries
 from ...row_texture import row_texture
-from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
+from ...scene_camera import box_depths, scene_camera_uniforms, scene_depth_scale
 from ...step import Step, Texture
 from ...surface_textures import SurfaceTextures
 from .programs import DrawPrograms
@@ -44,7 +42,7 @@ class Drawing:
 
     def draw(self, camera: Camera, output: SurfaceTextures) -> None:
         """Draw what a camera sees."""
-        gl, fluid = self._context.gl, self._particles.fluid
+        fluid = self._particles.fluid
         # Where all influence spheres begin behind the near clip plane no ray can start in one.
         with_starts = float(np.min(box_depths(self._box, camera))) <= camera.clip_start * (1 + 1e-6)
         programs = DrawPrograms(fluid.field.polynomial_kernel, with_starts, self._attributes).programs()
@@ -53,7 +51,7 @@ class Drawing:
             **scene_camera_uniforms(self._box - fluid.anchor, fluid.anchor, camera),
             **fluid.uniforms,
             "particle_count": len(self._particles),
-            "depth_scale": _depth_scale(camera, self._box),
+            "depth_scale": scene_depth_scale(camera, self._box),
             "is_exact": self._is_exact,
         }
         for step in steps.values():
@@ -62,17 +60,22 @@ class Drawing:
         if with_starts:
             steps["start"].draw_plainly(targets.inside, self._textures)
         output.clear()
-        gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-        gl.blend_func = moderngl.ONE, moderngl.ONE
         read: dict[str, Texture] = {**self._textures, **targets.textures}
         for query in self._queries.take(_ROUNDS if self._is_exact else 1):
             targets.front.clear(depth=1.0)
             with query.asked():
                 self._over_discs(steps["front"], targets.front, moderngl.DEPTH_TEST, read)
-            targets.sums.clear()
             with query.required():
-                self._over_discs(steps["blend"], targets.sums, moderngl.BLEND, read)
+                if not self._is_exact:
+                    self._blend(steps["blend"], targets, read)
                 steps["finish"].draw_plainly(targets.found, read)
+
+    def _blend(self, step: Step, targets: _Targets, read: Mapping[str, Texture]) -> None:
+        gl = self._context.gl
+        targets.sums.clear()
+        gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+        gl.blend_func = moderngl.ONE, moderngl.ONE
+        self._over_discs(step, targets.sums, moderngl.BLEND, read)
 
     def _over_discs(self, step: Step, framebuffer: moderngl.Framebuffer, flags: int, textures: Mapping[str, Texture]) -> None:
         gl = self._context.gl
@@ -101,12 +104,3 @@ class _Targets:
         self.found = gl.framebuffer([*output.textures.values(), beyond])
         # Rays begin before all that there is.
         gl.framebuffer([beyond]).clear(red=-_NOWHERE)
-
-
-def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
-    """Of distances from the anchor's plane."""
-    window = camera.window
-    slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
-    stretch = float(np.hypot.reduce([1.0, *slopes])) if camera.is_perspective else 1.0
-    farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
-    return depth_scale(max(farthest, 1e-30))

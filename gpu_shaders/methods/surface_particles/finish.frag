@@ -17,7 +17,7 @@ uniform sampler2D color_tx;
 const int FINISH_STEPS = 12;
 const float FINISH_LONGEST_STEP = 0.1;
 
-// How far beyond the middle of what was tried the next round begins, in influence radii.
+// How far beyond the front that was tried the next round begins, in influence radii.
 const float FINISH_BEYOND = 0.02;
 
 layout(location = 0) out float out_depth;
@@ -111,27 +111,25 @@ void put_nothing() {
 #endif
 }
 
-// Where a pixel's discs are on average, or where its ray meets the surface near there.
-Place place_of(ivec2 pixel, vec3 start, vec3 direction, float t) {
-    if (is_exact)
-        return place_on(start, direction, t, starts_inside(pixel) ? -1.0 : 1.0);
-    return Place(true, t, normalize(texelFetch(normal_sum_tx, pixel, 0).xyz), 0.0);
+// Where a pixel's discs are on average.
+Place place_between(ivec2 pixel, float front) {
+    vec4 sum = texelFetch(normal_sum_tx, pixel, 0);
+    return Place(sum.w > 0.0, front + texelFetch(way_sum_tx, pixel, 0).x / max(sum.w, 1e-30), normalize(sum.xyz), 0.0);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    float weight = texelFetch(normal_sum_tx, pixel, 0).w;
     // What an earlier round has found stays.
-    if (front_is_empty(pixel) || weight <= 0.0)
+    if (front_is_empty(pixel))
         discard;
     Ray ray = ray_from_pixel(gl_FragCoord.xy);
     vec3 start = scene_start(ray), direction = scene_direction(ray);
+    float front = front_distance(pixel);
     // From the nearest disc on no surface is passed over.
-    float t = front_distance(pixel) + (is_exact ? 0.0 : texelFetch(way_sum_tx, pixel, 0).x / weight);
-    Place place = place_of(pixel, start, direction, t);
+    Place place = is_exact ? place_on(start, direction, front, starts_inside(pixel) ? -1.0 : 1.0) : place_between(pixel, front);
     float depth = place.t / ray.stretch;
     put_nothing();
-    out_beyond = t + FINISH_BEYOND * place.radius;
+    out_beyond = front + FINISH_BEYOND * place.radius;
     if (place.is_there && depth >= clip_depths.x && depth <= clip_depths.y) {
         out_beyond = FRONT_DONE;
         out_depth = min(anchor_depth + depth, DEPTH_BACKGROUND);

@@ -35,7 +35,7 @@ class SurfaceParticlesMethod(PartedMethod[ShownParticles[GpuSurfaceParticles]]):
     def scene_of(self, request: Request, milliseconds: dict[str, float]) -> ShownParticles[GpuSurfaceParticles] | None:
         """The particles of the request's time."""
         with timed(milliseconds, "particles"):
-            return particles_at(request, f"{METHOD.name} {id(self)}", lambda: self._particles(request))
+            return particles_at(request, METHOD.name, lambda: self._particles(request), self._context)
 
     def _particles(self, request: Request) -> GpuSurfaceParticles:
         return GpuSurfaceParticles(self._context, self._crowd, SimulationOptions(**simulation_options(request.settings)))

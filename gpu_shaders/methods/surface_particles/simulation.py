@@ -180,7 +180,8 @@ class GpuSurfaceParticles:
         values = {
             "reach": self._reach,
             "push": PUSH,
-            "step_seed": _branch(self._options.seed, self._step),
+            "seed": self._options.seed,
+            "step_number": self._step,
             "disperses": self._options.disperses,
         }
         self._draw("spread", fluid, state, moved.framebuffer, values, pressures.textures)
@@ -218,12 +219,3 @@ def _from_anchor(balls: Balls, anchor: Doubles) -> Balls:
     """The balls with positions that count from the anchor."""
     positions = (balls.positions.astype(np.float64) - anchor).astype(np.float32)
     return Balls(positions, balls.radii, balls.weights, velocities=balls.velocities)
-
-
-def _branch(seed: int, number: int) -> int:
-    """The seed of a further use, as random_branch of lib/random.glsl."""
-    mask = 0xFFFFFFFF
-    value = (seed ^ number * 0x9E3779B9) & mask
-    value = ((value ^ value >> 16) * 0x7FEB352D) & mask
-    value = ((value ^ value >> 15) * 0x846CA68B) & mask
-    return value ^ value >> 16

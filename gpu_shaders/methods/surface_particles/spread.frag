@@ -7,7 +7,8 @@
 uniform sampler2D pressure_tx; // force, density
 uniform float reach;           // how far particles push one another, in influence radii
 uniform float push;            // how far pressure moves a particle, in reaches
-uniform uint step_seed;
+uniform uint seed;
+uniform uint step_number;
 uniform bool disperses;
 
 // One of so many particles may change its place in a step, for one whose density is less by more than the threshold.
@@ -17,9 +18,14 @@ const float DISPERSION_THRESHOLD = 0.5;
 layout(location = 0) out vec4 out_place;
 layout(location = 1) out vec4 out_normal;
 
+// Of a particle in this step.
+uint own_seed(int particle) {
+    return random_branch(random_branch(seed, step_number), uint(particle));
+}
+
 // A place of the surface where a particle has less company, if it should go there in this step; else -1.
 int thinner(int particle) {
-    uint number = random_branch(step_seed, uint(particle));
+    uint number = own_seed(particle);
     if (!disperses || number % DISPERSING != 0u)
         return -1;
     int other = int(random_mixed(number) % uint(particle_count));
@@ -31,7 +37,7 @@ int thinner(int particle) {
 // On the rim of another particle's influence, where it changes nothing (equation 10).
 vec3 rim_of(int other, int particle) {
     vec3 normal = particle_normal(other).xyz;
-    vec3 direction = random_direction(random_branch(step_seed, uint(particle)));
+    vec3 direction = random_direction(own_seed(particle));
     vec3 tangent = direction - dot(direction, normal) * normal;
     float span = length(tangent);
     vec4 place = particle_place(other);

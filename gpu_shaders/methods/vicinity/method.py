@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
 from ....addon.fluid.balls import Balls
 from ....addon.fluid.camera import Camera
@@ -15,10 +13,9 @@ from ....addon.fluid.errors import InputError
 from ....addon.fluid.kernels import KERNELS, PolynomialKernel
 from ....addon.render.method import Request, timed
 from ....addon.render.neighbours import MOST_NEIGHBOURS, Neighbours, find_neighbours
-from ...camera_parts import depth_scale
 from ...context import GpuContext, shared_context
 from ...parted_method import PartedMethod
-from ...scene_camera import box_depths, first_depth, scene_camera_uniforms
+from ...scene_camera import box_depths, scene_camera_uniforms, scene_depth_scale
 from ...stage_times import StageTimes
 from ...step import Step, Texture
 from ...surface_textures import SurfaceTextures
@@ -98,7 +95,7 @@ class Vicinity(PartedMethod[Neighbours]):
             **balls.uniforms,
             **_setting_uniforms(request.settings),
             "isovalue": field.threshold,
-            "depth_scale": _depth_scale(camera, box),
+            "depth_scale": scene_depth_scale(camera, box),
         }
         # Where all influence spheres begin behind the near clip plane no ray can start in one.
         may_start_inside = float(np.min(box_depths(box, camera))) <= camera.clip_start * (1 + 1e-6)
@@ -176,15 +173,6 @@ def _check(request: Request) -> None:
             f"{METHOD.label} finds the exact surface of polynomial kernels only, and {kernel.label} is none; switch "
             f"'{EXACT.label}' off, or choose another kernel"
         )
-
-
-def _depth_scale(camera: Camera, box: npt.NDArray[np.float64]) -> float:
-    """Of distances from the anchor's plane."""
-    window = camera.window
-    slopes = max(abs(window.left), abs(window.right)), max(abs(window.bottom), abs(window.top))
-    stretch = math.hypot(1.0, *slopes) if camera.is_perspective else 1.0
-    farthest = stretch * (float(np.max(box_depths(box, camera))) - first_depth(box, camera))
-    return depth_scale(max(farthest, 1e-30))
 
 
 def _draw(
