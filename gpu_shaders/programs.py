@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..addon.fluid.passes import DEPTH_BACKGROUND
+from ..addon.render.method import Attribute
 from .glsl import Source, explain
 
 ROW_TEXTURE_WIDTH = 4096
 """Texels on a line of those textures that shaders read row by row."""
 
 _RULER = re.compile(r"[=-]*")
+
+
+def output_constants(attributes: Sequence[Attribute]) -> dict[str, object]:
+    """What lib/outputs.glsl wants to know: which attributes there are beside depth and normal, in the order of ATTRIBUTES, and
+    their locations.
+    """
+    return {
+        "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
+        "WITH_COLORS": int("color" in attributes),
+        "WITH_VELOCITIES": int("velocity" in attributes),
+        "WITH_BALLS": int("ball" in attributes),
+        **{f"{name.upper()}_LOCATION": location for location, name in enumerate(attributes, start=2)},
+    }
 
 
 @dataclass(frozen=True)

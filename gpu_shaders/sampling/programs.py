@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 from ...addon.fluid.density_profile import DensityProfile
 from ...addon.fluid.kernels import KERNELS, Kernel
-from ...addon.fluid.passes import DEPTH_BACKGROUND
 from ...addon.render.method import Attribute
 from ..ball_textures import BALL_TEXTURE_WIDTH
 from ..image_cells import CELL_FACTOR, CELL_SIZE
 from ..kernel_constants import kernel_constants
-from ..programs import ProgramSource
+from ..programs import ProgramSource, output_constants
 
 FOLDER = "lib/sampling"
 ANY_KERNEL: tuple[Kernel, ...] = (*KERNELS.values(), DensityProfile([1, 0]))
@@ -48,7 +47,7 @@ class SamplingVariant:
             yield self.over_balls("dominant", f"{FOLDER}/dominant.frag", **kernel)
         for name in ("begin", "start", "count", "guess", "narrow", "found"):
             yield over_screen(name, f"{FOLDER}/{name}.frag")
-        yield over_screen("finish", f"{FOLDER}/finish.frag", **attributes, DEPTH_BACKGROUND=f"float({DEPTH_BACKGROUND!r})")
+        yield over_screen("finish", f"{FOLDER}/finish.frag", **attributes)
         yield over_screen("cells_from_samples", f"{FOLDER}/cells_from_samples.frag", CELL_SIZE=CELL_SIZE)
         yield over_screen("cells_from_cells", "lib/cells_from_cells.frag")
 
@@ -68,14 +67,8 @@ class SamplingVariant:
 
     def _attributes(self) -> dict[str, object]:
         """Which attributes there are, and at which places sums and results are written."""
-        constants: dict[str, object] = {
-            "WITH_COLORS": int("color" in self.attributes),
-            "WITH_VELOCITIES": int("velocity" in self.attributes),
-            "WITH_BALLS": int("ball" in self.attributes),
-        }
-        constants |= {f"{name.upper()}_LOCATION": place for place, name in enumerate(self.attributes, start=2)}
         summed = [name for name in self.attributes if name != "ball"]
-        return constants | {f"{name.upper()}_SUM": place for place, name in enumerate(summed, start=1)}
+        return output_constants(self.attributes) | {f"{name.upper()}_SUM": place for place, name in enumerate(summed, start=1)}
 
 
 def over_screen(name: str, fragment: str, **constants: object) -> ProgramSource:

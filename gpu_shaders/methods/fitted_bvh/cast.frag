@@ -1,17 +1,6 @@
 // Casts the ray of each pixel.
+#include "lib/outputs.glsl"
 #include "methods/fitted_bvh/cast.glsl"
-
-layout(location = 0) out float out_depth;
-layout(location = 1) out vec4 out_normal;
-#if WITH_COLORS
-layout(location = COLOR_LOCATION) out vec4 out_color;
-#endif
-#if WITH_VELOCITIES
-layout(location = VELOCITY_LOCATION) out vec4 out_velocity;
-#endif
-#if WITH_BALLS
-layout(location = BALL_LOCATION) out int out_ball;
-#endif
 
 
 

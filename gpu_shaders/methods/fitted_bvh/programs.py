@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from ....addon.fluid.kernels import POLYNOMIAL_KERNELS, PolynomialKernel
-from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
-from ...programs import ProgramSource
+from ...programs import ProgramSource, output_constants
 from ...tree_constants import TreeVariant
 
 FOLDER = "methods/fitted_bvh"
@@ -35,17 +34,9 @@ class Variant:
 
     def program(self) -> ProgramSource:
         """Casts the rays of the pixels: a compute shader where the tree lies in storage buffers."""
-        constants = {
-            **self.tree.constants(self.kernel),
-            "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
-            "WITH_COLORS": int("color" in self.attributes),
-            "WITH_VELOCITIES": int("velocity" in self.attributes),
-            "WITH_BALLS": int("ball" in self.attributes),
-        }
+        constants = {**self.tree.constants(self.kernel), **output_constants(self.attributes)}
         if self.tree.with_storage:
             return ProgramSource("cast", compute=f"{FOLDER}/cast.comp", constants=tuple(sorted(constants.items())))
-        for location, name in enumerate(self.attributes, start=2):
-            constants[f"{name.upper()}_LOCATION"] = location
         return ProgramSource("cast", "lib/screen.vert", f"{FOLDER}/cast.frag", constants=tuple(sorted(constants.items())))
 
 

@@ -1,4 +1,5 @@
 // The surface as the renderer wants it, of the glyph that each pixel sees.
+#include "lib/outputs.glsl"
 #include "methods/glyphs/glyph_texture.glsl"
 
 uniform usampler2D number_tx; // 0 for none
@@ -12,18 +13,6 @@ uniform sampler2D velocity_tx;
 #endif
 #if WITH_BALLS
 uniform isampler2D ball_tx;
-#endif
-
-layout(location = 0) out float out_depth;
-layout(location = 1) out vec4 out_normal;
-#if WITH_COLORS
-layout(location = COLOR_LOCATION) out vec4 out_color;
-#endif
-#if WITH_VELOCITIES
-layout(location = VELOCITY_LOCATION) out vec4 out_velocity;
-#endif
-#if WITH_BALLS
-layout(location = BALL_LOCATION) out int out_ball;
 #endif
 
 void main() {

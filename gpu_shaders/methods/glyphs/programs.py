@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
-from ...programs import ROW_TEXTURE_WIDTH, ProgramSource
+from ...programs import ROW_TEXTURE_WIDTH, ProgramSource, output_constants
 
 FOLDER = "methods/glyphs"
 
@@ -39,15 +38,7 @@ class Variant:
 
     def finish(self) -> ProgramSource:
         """Writes the surface."""
-        constants = {
-            **self._constants,
-            "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
-            "WITH_COLORS": int("color" in self.attributes),
-            "WITH_VELOCITIES": int("velocity" in self.attributes),
-            "WITH_BALLS": int("ball" in self.attributes),
-        }
-        for location, name in enumerate(self.attributes, start=2):
-            constants[f"{name.upper()}_LOCATION"] = location
+        constants = {**self._constants, **output_constants(self.attributes)}
         return ProgramSource("finish", "lib/screen.vert", f"{FOLDER}/finish.frag", constants=tuple(sorted(constants.items())))
 
 

@@ -1,5 +1,6 @@
 // The surface as the renderer wants it: where the discs of a pixel are on average; with `is_exact` where the ray meets the surface
 // near there. Colours, velocities and balls are those of the fluid at the place.
+#include "lib/outputs.glsl"
 #include "methods/surface_particles/fluid.glsl"
 #include "lib/scene_camera.glsl"
 #include "methods/surface_particles/front.glsl"
@@ -20,18 +21,7 @@ const float FINISH_LONGEST_STEP = 0.1;
 // How far beyond the front that was tried the next round begins, in influence radii.
 const float FINISH_BEYOND = 0.02;
 
-layout(location = 0) out float out_depth;
-layout(location = 1) out vec4 out_normal;
 layout(location = BEYOND_LOCATION) out float out_beyond;
-#if WITH_COLORS
-layout(location = COLOR_LOCATION) out vec4 out_color;
-#endif
-#if WITH_VELOCITIES
-layout(location = VELOCITY_LOCATION) out vec4 out_velocity;
-#endif
-#if WITH_BALLS
-layout(location = BALL_LOCATION) out int out_ball;
-#endif
 
 struct Place {
     bool is_there;
@@ -94,20 +84,6 @@ void put_attributes(vec3 point) {
 #endif
 #if WITH_BALLS
     out_ball = dominant;
-#endif
-}
-
-void put_nothing() {
-    out_depth = DEPTH_BACKGROUND;
-    out_normal = vec4(0.0);
-#if WITH_COLORS
-    out_color = vec4(0.0);
-#endif
-#if WITH_VELOCITIES
-    out_velocity = vec4(0.0);
-#endif
-#if WITH_BALLS
-    out_ball = -1;
 #endif
 }
 

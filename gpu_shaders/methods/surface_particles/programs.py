@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from ....addon.fluid.kernels import KERNELS, Kernel, PolynomialKernel
-from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
 from ...kernel_constants import kernel_constants
-from ...programs import ROW_TEXTURE_WIDTH, ProgramSource
+from ...programs import ROW_TEXTURE_WIDTH, ProgramSource, output_constants
 
 FOLDER = "methods/surface_particles"
 
@@ -62,14 +61,7 @@ class DrawPrograms:
         return {**programs, "start": _program("start", screen, **kernel)} if self.with_starts else programs
 
     def _outputs(self) -> dict[str, object]:
-        return {
-            "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
-            "BEYOND_LOCATION": 2 + len(self.attributes),
-            "WITH_COLORS": int("color" in self.attributes),
-            "WITH_VELOCITIES": int("velocity" in self.attributes),
-            "WITH_BALLS": int("ball" in self.attributes),
-            **{f"{name.upper()}_LOCATION": location for location, name in enumerate(self.attributes, start=2)},
-        }
+        return {**output_constants(self.attributes), "BEYOND_LOCATION": 2 + len(self.attributes)}
 
 
 def programs_of(kernel: Kernel) -> list[ProgramSource]:

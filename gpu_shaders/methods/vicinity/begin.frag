@@ -1,6 +1,6 @@
 // Nothing is found yet, and a ray ends where a kernel sphere bars it: there it is inside the fluid, so the surface is not behind. That
 // does not hold where a ball of negative weight carves, nor for a ray that starts inside.
-#include "methods/vicinity/outputs.glsl"
+#include "lib/outputs.glsl"
 #include "methods/vicinity/depth.glsl"
 
 layout(location = BARRIER_LOCATION) out float out_barrier;

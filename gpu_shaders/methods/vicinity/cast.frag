@@ -6,7 +6,7 @@
 #include "methods/vicinity/depth.glsl"
 #include "methods/vicinity/kernel_sphere.glsl"
 #include "methods/vicinity/lists.glsl"
-#include "methods/vicinity/outputs.glsl"
+#include "lib/outputs.glsl"
 #include "methods/vicinity/cell.glsl"
 #include "lib/leaf_surface.glsl"
 #if EXACT

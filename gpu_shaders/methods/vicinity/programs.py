@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from ....addon.fluid.kernels import KERNELS, Kernel, PolynomialKernel
-from ....addon.fluid.passes import DEPTH_BACKGROUND
 from ....addon.render.method import ATTRIBUTES, Attribute
 from ...kernel_constants import kernel_constants
-from ...programs import ProgramSource
+from ...programs import ProgramSource, output_constants
 
 FOLDER = "methods/vicinity"
 
@@ -64,14 +63,7 @@ class Variant:
         return _program(name, f"{FOLDER}/sphere.vert", **{**common, **constants})
 
     def _outputs(self) -> dict[str, object]:
-        return {
-            "DEPTH_BACKGROUND": f"float({DEPTH_BACKGROUND!r})",
-            "BARRIER_LOCATION": 2 + len(self.attributes),
-            "WITH_COLORS": int("color" in self.attributes),
-            "WITH_VELOCITIES": int("velocity" in self.attributes),
-            "WITH_BALLS": int("ball" in self.attributes),
-            **{f"{name.upper()}_LOCATION": location for location, name in enumerate(self.attributes, start=2)},
-        }
+        return {**output_constants(self.attributes), "BARRIER_LOCATION": 2 + len(self.attributes)}
 
 
 def all_programs() -> Iterator[ProgramSource]:
