@@ -15,6 +15,7 @@ from ..fluid.image import ImageBuffers
 from ..fluid.passes import Pass
 from ..render.instant import Sequence
 from .engine_name import ENGINE
+from .handlers import add_handlers, remove_handlers
 from .read_lighting import read_lighting
 from .read_meshes import read_meshes
 from .render_scene import Control, RenderSettings, read_view_layer
@@ -159,14 +160,13 @@ def _end_sequences(*_: object) -> None:
     _sequences.clear()
 
 
-_ENDS = ("render_complete", "render_cancel", "load_pre")
+_HANDLERS = dict.fromkeys(("render_complete", "render_cancel", "load_pre"), _end_sequences)
 
 
 def register() -> None:
     """Offer the engine, and show Blender's own panels that hold for it."""
     bpy.utils.register_class(MENISCUS_RE_engine)
-    for name in _ENDS:
-        getattr(bpy.app.handlers, name).append(_end_sequences)
+    add_handlers(_HANDLERS)
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.add(ENGINE)
 
@@ -175,8 +175,7 @@ def unregister() -> None:
     """Take the engine away."""
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.discard(ENGINE)
-    for name in _ENDS:
-        getattr(bpy.app.handlers, name).remove(_end_sequences)
+    remove_handlers(_HANDLERS)
     _end_sequences()
     bpy.utils.unregister_class(MENISCUS_RE_engine)
 

@@ -25,6 +25,7 @@ from ..render.particle_settings import SIMULATION_SETTINGS, simulation_options
 from ..render.surface_particles import SurfaceParticles
 from .baked_particles import baked_path, read_particles
 from .changes import CHANGES
+from .handlers import add_handlers, remove_handlers
 from .particle_mesh import Columns, columns_of, has_surface_particles, no_particles, put_particles
 from .preferences import threads_of
 from .read_scene import frame_seconds, read_field, read_fluid, scene_seconds
@@ -249,12 +250,10 @@ _HANDLERS = {
 
 def register() -> None:
     """Keep surface particles up to date from now on."""
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Leave them as they are."""
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    remove_handlers(_HANDLERS)
     CLOUDS.forget()

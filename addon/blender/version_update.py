@@ -11,6 +11,8 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
+from .handlers import add_handlers, remove_handlers
+
 
 def _keep_headlight(scene: bpy.types.Scene) -> None:
     """Before there were styles, all fluids were shown in the light of the eye."""
@@ -69,13 +71,9 @@ _HANDLERS = {"load_post": _update_file, "save_pre": _mark, "blend_import_post": 
 
 def register() -> None:
     """Listen for files."""
-    for name, handler in _HANDLERS.items():
-        if hasattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).append(handler)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Listen no more."""
-    for name, handler in _HANDLERS.items():
-        if hasattr(bpy.app.handlers, name):
-            getattr(bpy.app.handlers, name).remove(handler)
+    remove_handlers(_HANDLERS)

@@ -1,6 +1,5 @@
 """A user's hand: what the X server reports of a mouse and a keyboard, while the fluid is drawn."""
 
-import shutil
 import subprocess
 
 import bpy
@@ -8,10 +7,11 @@ import numpy as np
 import pytest
 from event_loop import turns, wait_until
 from fluid_scenes import add_emitter, add_points
+from hand import act, needs_hand
 from mathutils import Euler
 from viewports import look, region_picture
 
-pytestmark = pytest.mark.skipif(not shutil.which("xdotool"), reason="there is no xdotool to move the mouse with")
+pytestmark = needs_hand
 
 
 @pytest.fixture
@@ -24,12 +24,6 @@ def drop(new_file, fluid):
     fluid.check_presence("before_events", shown)
     act("mousemove", *middle(shown.window, shown.region))
     return shown
-
-
-def act(*words):
-    """Let the mouse or the keyboard do something, and Blender learn of it."""
-    subprocess.run(["xdotool", *map(str, words)], check=True, timeout=10)
-    turns(3)
 
 
 def middle(window, region):

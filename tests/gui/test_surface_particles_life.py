@@ -1,14 +1,13 @@
 """Surface particles while the user goes on: a bake in the interface, renders beside viewports, undo."""
 
 import importlib
-import shutil
-import subprocess
 
 import bpy
 import numpy as np
 import pytest
 from event_loop import turns, wait_until
 from fluid_scenes import add_points
+from hand import act, needs_hand
 
 LAST = 2000
 
@@ -105,9 +104,9 @@ def test_a_bake_ends_where_its_object_is_removed(bake, tmp_path):
     wait_until(lambda: files(tmp_path) == [], "the end of the files")
 
 
-@pytest.mark.skipif(not shutil.which("xdotool"), reason="there is no xdotool to press a key with")
+@needs_hand
 def test_escape_cancels_a_bake(bake, tmp_path):
-    subprocess.run(["xdotool", "mousemove", "400", "400", "key", "Escape"], check=True, timeout=10)
+    act("mousemove", 400, 400, "key", "Escape")
     wait_until(lambda: files(tmp_path) == [], "the end of the files")
     assert particles().meniscus.baked_files == ""
     assert bpy.context.scene.frame_current == 1

@@ -28,67 +28,91 @@ _ROUNDS = 8
 _NOWHERE = 3e38
 
 
-class Drawing:
-    """Draws the particles of a frame; made and used on the context's thread."""
+class DiscPainter:
+    """Draws particles; made and used on the context's thread. Programs and targets stay from image to image."""
 
-    def __init__(self, context: GpuContext, request: Request, particles: GpuSurfaceParticles, is_exact: bool) -> None:
-        self._context, self._particles, self._is_exact = context, particles, is_exact
-        self._queries = OcclusionQueries(context)
-        self._attributes, self._box = request.known_attributes, request.balls.bounds
-        self._textures: dict[str, Texture] = {**particles.fluid.textures, **particles.disc_textures}
-        if "color" in self._attributes and request.balls.colors is not None:
-            colors = np.column_stack([request.balls.colors, np.ones(len(request.balls), np.float32)])
-            self._textures["color_tx"] = row_texture(context.gl, colors)
+    def __init__(self, context: GpuContext) -> None:
+        self._context, self._queries = context, OcclusionQueries(context)
+        self._steps: dict[DrawPrograms, dict[str, Step]] = {}
+        self._targets: _Targets | None = None
 
-    def draw(self, camera: Camera, output: SurfaceTextures) -> None:
-        """Draw what a camera sees."""
-        fluid = self._particles.fluid
+    def draw(
+        self, request: Request, particles: GpuSurfaceParticles, is_exact: bool, camera: Camera, output: SurfaceTextures
+    ) -> None:
+        """Draw what a camera sees; there are particles."""
+        fluid, box = particles.fluid, request.balls.bounds
         # Where all influence spheres begin behind the near clip plane no ray can start in one.
-        with_starts = float(np.min(box_depths(self._box, camera))) <= camera.clip_start * (1 + 1e-6)
-        programs = DrawPrograms(fluid.field.polynomial_kernel, with_starts, self._attributes).programs()
-        steps = {name: Step(self._context, source) for name, source in programs.items()}
+        with_starts = float(np.min(box_depths(box, camera))) <= camera.clip_start * (1 + 1e-6)
+        steps = self._steps_for(DrawPrograms(fluid.field.polynomial_kernel, with_starts, request.known_attributes))
         uniforms = {
-            **scene_camera_uniforms(self._box - fluid.anchor, fluid.anchor, camera),
+            **scene_camera_uniforms(box - fluid.anchor, fluid.anchor, camera),
             **fluid.uniforms,
-            "particle_count": len(self._particles),
-            "depth_scale": scene_depth_scale(camera, self._box),
-            "is_exact": self._is_exact,
+            "particle_count": len(particles),
+            "depth_scale": scene_depth_scale(camera, box),
+            "is_exact": is_exact,
         }
         for step in steps.values():
             step.set_uniforms(uniforms)
-        targets = _Targets(self._context, output)
+        targets = self._targets_for(output.size)
+        read: dict[str, Texture] = {**fluid.textures, **particles.disc_textures, **targets.textures}
+        if "color" in request.known_attributes and request.balls.colors is not None:
+            colors = np.column_stack([request.balls.colors, np.ones(len(request.balls), np.float32)])
+            read["color_tx"] = row_texture(self._context.gl, colors)
         if with_starts:
-            steps["start"].draw_plainly(targets.inside, self._textures)
+            steps["start"].draw_plainly(targets.inside, read)
         output.clear()
-        read: dict[str, Texture] = {**self._textures, **targets.textures}
-        for query in self._queries.take(_ROUNDS if self._is_exact else 1):
-            targets.front.clear(depth=1.0)
-            with query.asked():
-                self._over_discs(steps["front"], targets.front, moderngl.DEPTH_TEST, read)
-            with query.required():
-                if not self._is_exact:
-                    self._blend(steps["blend"], targets, read)
-                steps["finish"].draw_plainly(targets.found, read)
+        targets.begin()
+        self._draw_sheets(steps, targets, output, read, _CORNERS * len(particles), is_exact)
 
-    def _blend(self, step: Step, targets: _Targets, read: Mapping[str, Texture]) -> None:
-        gl = self._context.gl
-        targets.sums.clear()
-        gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
-        gl.blend_func = moderngl.ONE, moderngl.ONE
-        self._over_discs(step, targets.sums, moderngl.BLEND, read)
+    def forget(self) -> None:
+        """Give back what is kept for one size of image."""
+        self._targets = None
 
-    def _over_discs(self, step: Step, framebuffer: moderngl.Framebuffer, flags: int, textures: Mapping[str, Texture]) -> None:
+    def _draw_sheets(
+        self,
+        steps: Mapping[str, Step],
+        targets: _Targets,
+        output: SurfaceTextures,
+        read: Mapping[str, Texture],
+        vertices: int,
+        is_exact: bool,
+    ) -> None:
+        """One sheet of discs after the other while pixels look for the surface; only the first where discs are blended."""
         gl = self._context.gl
-        gl.enable_only(flags)
+        found = gl.framebuffer([*output.textures.values(), targets.beyond])
         gl.depth_func = "<"
-        step.draw(framebuffer, moderngl.TRIANGLES, _CORNERS * len(self._particles), textures)
+        for query in self._queries.take(_ROUNDS if is_exact else 1):
+            targets.front.clear(depth=1.0)
+            gl.enable_only(moderngl.DEPTH_TEST)
+            with query.asked():
+                steps["front"].draw(targets.front, moderngl.TRIANGLES, vertices, read)
+            with query.required():
+                if not is_exact:
+                    targets.sums.clear()
+                    gl.enable_only(moderngl.BLEND)
+                    gl.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+                    gl.blend_func = moderngl.ONE, moderngl.ONE
+                    steps["blend"].draw(targets.sums, moderngl.TRIANGLES, vertices, read)
+                steps["finish"].draw_plainly(found, read)
+
+    def _steps_for(self, variant: DrawPrograms) -> dict[str, Step]:
+        if variant not in self._steps:
+            self._steps[variant] = {name: Step(self._context, source) for name, source in variant.programs().items()}
+        return self._steps[variant]
+
+    def _targets_for(self, size: tuple[int, int]) -> _Targets:
+        if self._targets is None or self._targets.size != size:
+            self._targets = None  # its memory may be needed
+            self._targets = _Targets(self._context, size)
+        return self._targets
 
 
 class _Targets:
     """What is drawn into beside the surface, for one size of image."""
 
-    def __init__(self, context: GpuContext, output: SurfaceTextures) -> None:
-        gl, size = context.gl, output.size
+    def __init__(self, context: GpuContext, size: tuple[int, int]) -> None:
+        gl = context.gl
+        self.size = size
         front = context.depth_texture(size)
         normals, ways, insides, beyond = (plain(gl.texture(size, components, dtype="f4")) for components in (4, 1, 1, 1))
         self.textures = {
@@ -101,6 +125,9 @@ class _Targets:
         self.front = gl.framebuffer([], front)
         self.sums = gl.framebuffer([normals, ways])
         self.inside = gl.framebuffer([insides])
-        self.found = gl.framebuffer([*output.textures.values(), beyond])
-        # Rays begin before all that there is.
-        gl.framebuffer([beyond]).clear(red=-_NOWHERE)
+        self.beyond = beyond
+        self._beginning = gl.framebuffer([beyond])
+
+    def begin(self) -> None:
+        """No ray has looked at anything yet."""
+        self._beginning.clear(red=-_NOWHERE)

@@ -15,7 +15,7 @@ from ...stage_times import StageTimes
 from ...step import Step
 from ...surface_textures import SurfaceTextures
 from .crowds import best_crowd
-from .drawing import Drawing
+from .drawing import DiscPainter
 from .params import METHOD
 from .programs import programs_of
 from .simulation import GpuSurfaceParticles, SimulationOptions
@@ -28,7 +28,7 @@ class SurfaceParticlesMethod(PartedMethod[ShownParticles[GpuSurfaceParticles]]):
         # Depth, normal, the attributes, and how far rays have come.
         context.require(METHOD.gl_version, 3 + len(METHOD.attributes))
         super().__init__(context, METHOD)
-        self._crowd = context.run(lambda: best_crowd(context))
+        self._crowd, self._painter = context.run(lambda: (best_crowd(context), DiscPainter(context)))
         # A driver that rejects the shaders is to be known before the method is chosen.
         context.run(lambda: [Step(context, source) for source in programs_of(KERNELS["wyvill"])])
 
@@ -48,6 +48,10 @@ class SurfaceParticlesMethod(PartedMethod[ShownParticles[GpuSurfaceParticles]]):
         """See :meth:`PartedMethod.notes_of`."""
         return scene.notes
 
+    def forget(self) -> None:
+        """See :meth:`PartedMethod.forget`."""
+        self._painter.forget()
+
     def fill(
         self, request: Request, scene: ShownParticles[GpuSurfaceParticles], camera: Camera, textures: SurfaceTextures
     ) -> None:
@@ -57,7 +61,7 @@ class SurfaceParticlesMethod(PartedMethod[ShownParticles[GpuSurfaceParticles]]):
             return
         times = StageTimes(self._context)
         with times.of("draw"):
-            Drawing(self._context, request, scene.particles, bool(request.settings[EXACT.name])).draw(camera, textures)
+            self._painter.draw(request, scene.particles, bool(request.settings[EXACT.name]), camera, textures)
         textures.add_report(times.milliseconds, {})
 
 
