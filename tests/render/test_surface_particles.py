@@ -34,6 +34,12 @@ def later(balls: meniscus.Balls, seconds: float) -> meniscus.Balls:
     return meniscus.Balls(balls.positions + seconds * balls.velocities, balls.radii, velocities=balls.velocities)
 
 
+def without_some(balls: meniscus.Balls) -> meniscus.Balls:
+    """A quarter of the balls are gone, with their mirror images."""
+    stay = np.arange(80) % 40 >= 10
+    return meniscus.Balls(balls.positions[stay], balls.radii[stay], velocities=balls.velocities[stay])
+
+
 def on_gpu(kind, **options) -> GpuSurfaceParticles:
     context = shared_context()
     return GpuSurfaceParticles(context, context.run(lambda: kind(context)), SimulationOptions(**options))
@@ -46,7 +52,8 @@ def test_they_move_as_those_of_the_native_core(crowd, count, radii):
     balls = mirrored_balls(radii)
     mine, native = on_gpu(crowd, count=count, steps=3), meniscus.SurfaceParticles(count, steps=3)
     reports = [(mine.seed(balls, FIELD), native.seed(balls, FIELD))]
-    reports.append((mine.follow(later(balls, FRAME), FIELD, FRAME), native.follow(later(balls, FRAME), FIELD, FRAME)))
+    following = without_some(later(balls, FRAME))
+    reports.append((mine.follow(following, FIELD, FRAME), native.follow(following, FIELD, FRAME)))
     assert reports[0][1].placed > 500
     assert reports[1][1].lost > 0
     for own, other in reports:

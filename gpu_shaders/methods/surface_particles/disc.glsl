@@ -4,7 +4,7 @@
 uniform vec2 clip_depths; // planar, from the anchor
 
 // A disc says nothing where the surface would have turned away from its middle by more than this cosine.
-const float DISC_TURNED = 0.7;
+uniform float least_cosine;
 
 struct Disc {
     vec3 position; // scene coordinates
@@ -52,7 +52,7 @@ Meeting disc_meeting(Disc disc, Ray ray, bool starts_inside) {
         float share = dot(place, place) / (disc.radius * disc.radius);
         float depth = t / ray.stretch;
         bool is_between = depth >= clip_depths.x && depth <= clip_depths.y;
-        bool is_near = share < 1.0 && dot(normal, disc.normal) > DISC_TURNED * length(normal);
+        bool is_near = share < 1.0 && dot(normal, disc.normal) > least_cosine * length(normal);
         if (is_near && is_between && (dot(normal, direction) > 0.0) == starts_inside)
             return Meeting(true, t, normalize(normal), (1.0 - share) * (1.0 - share));
     }

@@ -25,6 +25,11 @@ _CORNERS = 6
 _ROUNDS = 8
 """Sheets of discs that a ray looks at for the surface: discs reach a little beyond the edges of what they are on."""
 
+_TURNED, _TURNED_TO_EDGE = 0.7, 0.0
+"""Cosines by which the surface may turn away from a disc's middle: where discs are blended, and where they only lead to the
+surface. There the next sheet is looked at where one leads nowhere, and a tip that is narrower than all discs has no other.
+"""
+
 _NOWHERE = 3e38
 
 
@@ -50,6 +55,7 @@ class DiscPainter:
             "particle_count": len(particles),
             "depth_scale": scene_depth_scale(camera, box),
             "is_exact": is_exact,
+            "least_cosine": _TURNED_TO_EDGE if is_exact else _TURNED,
         }
         for step in steps.values():
             step.set_uniforms(uniforms)

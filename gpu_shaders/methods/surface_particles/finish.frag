@@ -27,25 +27,25 @@ struct Place {
     bool is_there;
     float t;
     vec3 normal;
-    float radius; // the least influence radius there
+    float scale; // the greatest mean influence radius on the way
 };
 
 // Where a ray meets the surface near a distance.
 Place place_on(vec3 start, vec3 direction, float t, float side) {
-    float radius = 0.0;
+    float scale = 0.0;
     for (int i = 0; i < FINISH_STEPS; i++) {
         Sample found = fluid_sample(start + t * direction);
         float slope = length(found.gradient), rise = side * dot(found.gradient, direction);
-        radius = max(radius, found.radius);
+        scale = max(scale, found.scale);
         float missing = side * (isovalue - found.density);
         if (!(slope > 0.0))
             break;
-        if (abs(missing) <= 1e-5 * slope * found.radius && rise > 0.0)
-            return Place(true, t, -found.gradient / slope, radius);
-        float longest = FINISH_LONGEST_STEP * found.radius;
+        if (abs(missing) <= 1e-5 * slope * found.scale && rise > 0.0)
+            return Place(true, t, -found.gradient / slope, scale);
+        float longest = FINISH_LONGEST_STEP * found.scale;
         t += clamp(missing / max(rise, 0.01 * slope), -longest, longest);
     }
-    return Place(false, t, vec3(0.0), radius);
+    return Place(false, t, vec3(0.0), scale);
 }
 
 // Weighted by the share of each ball in the density.
@@ -105,7 +105,7 @@ void main() {
     Place place = is_exact ? place_on(start, direction, front, starts_inside(pixel) ? -1.0 : 1.0) : place_between(pixel, front);
     float depth = place.t / ray.stretch;
     put_nothing();
-    out_beyond = front + FINISH_BEYOND * place.radius;
+    out_beyond = front + FINISH_BEYOND * place.scale;
     if (place.is_there && depth >= clip_depths.x && depth <= clip_depths.y) {
         out_beyond = FRONT_DONE;
         out_depth = min(anchor_depth + depth, DEPTH_BACKGROUND);

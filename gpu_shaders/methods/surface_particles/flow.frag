@@ -16,5 +16,5 @@ void main() {
     vec4 place = particle_place(particle);
     Sample found = fluid_sample(place.xyz);
     vec3 correction = (fluid_constrained(found, found.velocity, found.rate, 0.0) - found.velocity) * seconds;
-    out_place = vec4(place.xyz + seconds * found.velocity + motion_within(correction, found.radius) + anchor_shift, place.w);
+    out_place = vec4(place.xyz + seconds * found.velocity + motion_within(correction, found.scale) + anchor_shift, place.w);
 }

@@ -9,7 +9,6 @@ uniform float isovalue;
 const int FLUID_PROJECTIONS = 8;
 const float FLUID_LONGEST_PROJECTION = 0.25;
 const float FLUID_NEAR = 1e-3;
-const float FLUID_NO_RADIUS = 3e38;
 
 // What the balls give at a point.
 struct Sample {
@@ -17,8 +16,7 @@ struct Sample {
     vec3 gradient; // of F by the point
     float rate;    // how fast F changes because balls move
     vec3 velocity; // of the balls, weighted by the lengths of their gradients (equation 3)
-    float radius;  // the least influence radius of the balls that reach the point, 0 where none does
-    float scale;   // the harmonic mean of their influence radii, weighted by the lengths of their gradients
+    float scale;   // the harmonic mean of their influence radii, weighted by the lengths of their gradients; 0 where none reaches
 };
 
 struct SurfacePoint {
@@ -42,12 +40,11 @@ void fluid_add_ball(inout Sample found, inout vec2 sums, vec3 point, int ball) {
     found.gradient += slope;
     found.rate -= dot(slope, motion.xyz);
     found.velocity += slope_length * motion.xyz;
-    found.radius = min(found.radius, sphere.w);
     sums += slope_length * vec2(1.0, 1.0 / sphere.w);
 }
 
 Sample fluid_sample(vec3 point) {
-    Sample found = Sample(0.0, vec3(0.0), 0.0, vec3(0.0), FLUID_NO_RADIUS, 0.0);
+    Sample found = Sample(0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
     vec2 sums = vec2(0.0);
     int count = hash_levels();
     for (int level = 0; level < count; level++) {
@@ -62,8 +59,6 @@ Sample fluid_sample(vec3 point) {
         found.velocity /= sums.x;
         found.scale = sums.x / sums.y;
     }
-    if (found.radius == FLUID_NO_RADIUS)
-        found.radius = 0.0;
     return found;
 }
 
@@ -76,9 +71,9 @@ SurfacePoint fluid_projected(vec3 position) {
             break;
         float way = (isovalue - found.density) / slope;
         vec3 normal = -found.gradient / slope;
-        if (abs(way) <= FLUID_NEAR * found.radius)
+        if (abs(way) <= FLUID_NEAR * found.scale)
             return SurfacePoint(true, position - way * normal, normal, found.scale);
-        float longest = FLUID_LONGEST_PROJECTION * found.radius;
+        float longest = FLUID_LONGEST_PROJECTION * found.scale;
         position -= clamp(way, -longest, longest) * normal;
     }
     return SurfacePoint(false, position, vec3(0.0), 0.0);

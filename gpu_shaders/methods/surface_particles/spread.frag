@@ -49,7 +49,7 @@ vec3 pushed(int particle, vec4 place) {
     Sample found = fluid_sample(place.xyz);
     float own_reach = reach * place.w;
     vec3 desired = motion_within(push * own_reach * texelFetch(pressure_tx, particle_texel(particle), 0).xyz, own_reach);
-    return place.xyz + motion_within(fluid_constrained(found, desired, 0.0, 1.0), found.radius);
+    return place.xyz + motion_within(fluid_constrained(found, desired, 0.0, 1.0), found.scale);
 }
 
 void main() {

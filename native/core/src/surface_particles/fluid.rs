@@ -28,9 +28,8 @@ pub struct Sample {
     pub rate: f64,
     /// The mean of the balls' velocities, weighted by the lengths of their gradients (equation 3).
     pub velocity: [f64; 3],
-    /// The least influence radius of the balls that reach the point, 0 where none does.
-    pub radius: f64,
-    /// The harmonic mean of their influence radii, weighted by the lengths of their gradients: how large things are there.
+    /// The harmonic mean of their influence radii, weighted by the lengths of their gradients: how large things are there; 0 where
+    /// none reaches.
     pub scale: f64,
 }
 
@@ -127,7 +126,7 @@ impl Fluid {
 
     /// The density at a point and what it changes with.
     pub fn sample(&self, point: [f64; 3]) -> Sample {
-        let mut sample = Sample { radius: f64::INFINITY, ..Sample::default() };
+        let mut sample = Sample::default();
         let (mut velocity, mut lengths, mut curvatures) = ([0.0; 3], 0.0, 0.0);
         self.hash.for_near(point, |ball| {
             let radius = f64::from(self.radii[ball]);
@@ -140,7 +139,6 @@ impl Fluid {
             let slope = offset.map(|c| -2.0 * weight * self.field.kernel.derivative(x) / (radius * radius) * c);
             sample.density += weight * self.field.kernel.value(x);
             sample.gradient = plus(sample.gradient, 1.0, slope);
-            sample.radius = sample.radius.min(radius);
             let length = dot(slope, slope).sqrt();
             lengths += length;
             curvatures += length / radius;
@@ -153,9 +151,6 @@ impl Fluid {
         if lengths > 0.0 {
             sample.velocity = velocity.map(|c| c / lengths);
             sample.scale = lengths / curvatures;
-        }
-        if sample.radius == f64::INFINITY {
-            sample.radius = 0.0;
         }
         sample
     }
@@ -200,11 +195,11 @@ impl Fluid {
             if !distance.is_finite() {
                 return None;
             }
-            if distance.abs() <= NEAR * sample.radius {
+            if distance.abs() <= NEAR * sample.scale {
                 let normal = sample.gradient.map(|c| -c / slope);
                 return Some(SurfacePoint { position: plus(position, -distance, normal), normal, scale: sample.scale });
             }
-            let longest = LONGEST_PROJECTION * sample.radius;
+            let longest = LONGEST_PROJECTION * sample.scale;
             position = plus(position, distance.clamp(-longest, longest) / slope, sample.gradient);
         }
         None

@@ -244,7 +244,7 @@ impl SurfaceParticles {
             let velocity = sample.constrained(sample.velocity, fluid.field().isovalue, 0.0);
             let correction = difference(velocity, sample.velocity).map(|c| c * seconds);
             let moved = plus(position, seconds, sample.velocity);
-            particle.position = single(plus(moved, 1.0, within(correction, sample.radius)));
+            particle.position = single(plus(moved, 1.0, within(correction, sample.scale)));
         });
     }
 
@@ -499,7 +499,7 @@ fn pushed(fluid: &Fluid, particle: &Particle, pressure: &Pressure, reach: f64) -
     let sample = Sample { rate: 0.0, ..fluid.sample(position) };
     let reach = reach * f64::from(particle.scale);
     let desired = within(pressure.force.map(|c| PUSH * reach * c), reach);
-    plus(position, 1.0, within(sample.constrained(desired, fluid.field().isovalue, 1.0), sample.radius))
+    plus(position, 1.0, within(sample.constrained(desired, fluid.field().isovalue, 1.0), sample.scale))
 }
 
 /// The particle moved onto the surface near a point.

@@ -1,5 +1,5 @@
-//! Points all over the surface, found from the balls alone: where rays from a ball's centre leave the fluid, each is moved onto the
-//! surface from the ball's kernel sphere. Every part of the surface has balls that reach it, so none is missed, whoever looks from where.
+//! Points all over the surface, found from the balls alone: where rays from a ball's centre leave the fluid for the last time
+//! within its influence sphere. Every part of the surface has balls that reach it, so none is missed, whoever looks from where.
 
 use std::f64::consts::TAU;
 
@@ -22,8 +22,8 @@ const MOST: usize = 1 << 16;
 /// Balls that a thread takes at a time.
 const PART: usize = 64;
 
-/// Where rays begin that are to be moved onto the surface, in influence radii, where a ball has no kernel sphere.
-const MIDDLE: f64 = 0.5;
+/// Where a ray is looked at between the kernel sphere and the influence sphere.
+const STEPS: usize = 6;
 
 /// Finds points of the surface that are about `spacing` influence radii apart on the surface of each ball. Of balls of which no point
 /// of a few is one to `look_at` there are only these.
@@ -92,8 +92,8 @@ struct Rays<'a> {
     fluid: &'a Fluid,
     center: [f64; 3],
     radius: f64,
-    /// Where they are moved onto the surface from.
-    begin: f64,
+    /// Up to here they are in the fluid.
+    kernel_radius: f64,
     pole: [f64; 3],
 }
 
@@ -101,9 +101,8 @@ impl<'a> Rays<'a> {
     /// `kernels_hold` says that no ball takes density away.
     fn of(fluid: &'a Fluid, ball: usize, kernels_hold: bool, seed: u32) -> Self {
         let (center, radius, weight) = fluid.ball(ball);
-        let share = if kernels_hold { fluid.field().kernel_radius_share(weight) } else { 0.0 };
-        let begin = radius * if share > 0.0 { share } else { MIDDLE };
-        Self { fluid, center, radius, begin, pole: any_direction(seed) }
+        let kernel_radius = if kernels_hold { radius * fluid.field().kernel_radius_share(weight) } else { 0.0 };
+        Self { fluid, center, radius, kernel_radius, pole: any_direction(seed) }
     }
 
     /// The points where so many rays leave the fluid, and how far they are from the centre.
@@ -111,12 +110,18 @@ impl<'a> Rays<'a> {
         (0..count).filter_map(move |index| self.leaving_along(along(self.pole, fibonacci(index, count))))
     }
 
-    /// Where a ray leaves the fluid, if it is outside at the end of the influence sphere.
+    /// Where a ray leaves the fluid for the last time before the end of the influence sphere, about.
     fn leaving_along(&self, direction: [f64; 3]) -> Option<(SurfacePoint, f64)> {
-        if self.fluid.is_inside(plus(self.center, self.radius, direction)) {
+        let is_inside = |distance: f64| self.fluid.is_inside(plus(self.center, distance, direction));
+        if is_inside(self.radius) {
             return None;
         }
-        let point = self.fluid.projected(plus(self.center, self.begin, direction))?;
+        let step = (self.radius - self.kernel_radius) / STEPS as f64;
+        // The kernel sphere itself is decided by no rounding.
+        let is_in = |distance: &f64| is_inside(*distance);
+        let found = (1..STEPS).map(|count| self.radius - count as f64 * step).find(is_in);
+        let inside = found.or_else(|| (self.kernel_radius > 0.0 || is_inside(0.0)).then_some(self.kernel_radius))?;
+        let point = self.fluid.projected(plus(self.center, inside + 0.5 * step, direction))?;
         let offset = difference(point.position, self.center);
         let squared = dot(offset, offset);
         (squared <= self.radius * self.radius).then(|| (point, squared.sqrt()))

@@ -185,26 +185,26 @@ impl<'a> Band<'a> {
     fn surface_near(&self, ray: &Ray, front: f64, starts_inside: bool) -> std::result::Result<Shown, f64> {
         let side = if starts_inside { -1.0 } else { 1.0 };
         let direction = self.turned(ray.direction, [0.0; 3]);
-        let (mut distance, mut radius) = (front, 0.0);
+        let (mut distance, mut scale) = (front, 0.0);
         for _ in 0..STEPS {
             let sample = self.fluid.sample(self.point(ray, distance));
             let slope = dot(sample.gradient, sample.gradient).sqrt();
             let (rise, missing) =
                 (side * dot(sample.gradient, direction), side * (self.fluid.field().isovalue - sample.density));
-            radius = sample.radius.max(radius);
+            scale = sample.scale.max(scale);
             if slope == 0.0 {
                 break;
             }
-            if missing.abs() <= NEAR * slope * sample.radius && rise > 0.0 {
+            if missing.abs() <= NEAR * slope * sample.scale && rise > 0.0 {
                 if self.is_between_clips(ray, distance) {
                     return Ok(Shown { distance, normal: sample.gradient.map(|c| -c / slope) });
                 }
                 break;
             }
-            let longest = LONGEST_STEP * sample.radius;
+            let longest = LONGEST_STEP * sample.scale;
             distance += (missing / rise.max(LEAST_RISE * slope)).clamp(-longest, longest);
         }
-        Err(front + BEYOND * radius)
+        Err(front + BEYOND * scale)
     }
 
     fn is_between_clips(&self, ray: &Ray, distance: f64) -> bool {

@@ -12,8 +12,12 @@ use crate::vectors::{difference, dot, double, plus};
 const RADIUS_SPACINGS: f64 = 1.2;
 const RADIUS_REACHES: f64 = 0.65;
 
-/// A disc says nothing where the surface would have turned away from its middle by more than this cosine.
-const TURNED: f64 = 0.7;
+/// A disc that is blended says nothing where the surface would have turned away from its middle by more than this cosine.
+pub const TURNED: f64 = 0.7;
+
+/// What leads to the surface may turn as far as to its edge: where it leads nowhere the next sheet is looked at, and a tip that is
+/// narrower than the discs around it has no other.
+pub const TURNED_TO_EDGE: f64 = 0.0;
 
 /// What lies farther behind the nearest disc than this, in radii of the disc, is another sheet.
 pub const BLEND_BEHIND: f64 = 0.5;
@@ -30,6 +34,8 @@ pub struct Disc {
     /// A.
     pub bend: Symmetric,
     pub radius: f64,
+    /// The least cosine between its normal in the middle and elsewhere.
+    pub turned: f64,
 }
 
 /// A ray in the space of a disc.
@@ -54,12 +60,12 @@ pub struct Meeting {
 impl Disc {
     /// In world space; None where the particle is no longer on the surface. `reach` is how far particles push one another, in
     /// influence radii.
-    pub fn new(fluid: &Fluid, particle: &Particle, reach: f64) -> Option<Self> {
+    pub fn new(fluid: &Fluid, particle: &Particle, reach: f64, turned: f64) -> Option<Self> {
         // Particles have single precision.
         let place = fluid.projected(double(particle.position))?;
         let radius = (RADIUS_SPACINGS * f64::from(particle.spacing)).max(RADIUS_REACHES * reach * f64::from(particle.scale));
         let bend = bend(place.normal, fluid.second_derivatives(place.position), fluid.sample(place.position).gradient);
-        Some(Self { middle: place.position, normal: place.normal, bend, radius })
+        Some(Self { middle: place.position, normal: place.normal, bend, radius, turned })
     }
 
     /// In camera space.
@@ -80,6 +86,7 @@ impl Disc {
                 bent(up, forward),
             ],
             radius: self.radius,
+            turned: self.turned,
         }
     }
 
@@ -104,7 +111,7 @@ impl Disc {
             let share = dot(place, place) / radius_2;
             let depth = (along + root) * ray.direction[2] + ray.start[2];
             let is_between = depth >= clip[0] && depth <= clip[1];
-            let is_near = share < 1.0 && dot(normal, self.normal) > TURNED * dot(normal, normal).sqrt();
+            let is_near = share < 1.0 && dot(normal, self.normal) > self.turned * dot(normal, normal).sqrt();
             if is_near && is_between && (dot(normal, ray.direction) > 0.0) == starts_inside {
                 let length = dot(normal, normal).sqrt();
                 let normal = normal.map(|c| c / length);

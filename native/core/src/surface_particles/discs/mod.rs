@@ -23,7 +23,7 @@ mod tests;
 use rayon::prelude::*;
 
 use self::band::Band;
-use self::disc::{Disc, Shown};
+use self::disc::{Disc, Shown, TURNED, TURNED_TO_EDGE};
 use super::SurfaceParticles;
 use super::fluid::Fluid;
 use crate::bands::{BAND, Bins, CHUNK, Centers};
@@ -52,8 +52,9 @@ impl SurfaceParticles {
             ));
         }
         job.expect(self.particles.len().div_ceil(CHUNK) + view.height.div_ceil(BAND));
-        let discs: Vec<Disc> =
-            self.particles.par_iter().filter_map(|particle| Disc::new(fluid, particle, self.reach)).collect();
+        let turned = if is_exact { TURNED_TO_EDGE } else { TURNED };
+        let discs = self.particles.par_iter().filter_map(|particle| Disc::new(fluid, particle, self.reach, turned));
+        let discs: Vec<Disc> = discs.collect();
         let can_start_inside = reaches_clip_start(fluid, view);
         let bins = Bins::new(path, &Shown { discs: &discs, can_start_inside }, view, job)?;
         let centers = Centers::new(view)?;

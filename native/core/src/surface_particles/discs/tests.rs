@@ -1,6 +1,6 @@
 //! Against closed forms: spheres, and what the shape of a surface says of its normals.
 
-use super::disc::{Disc, Ray};
+use super::disc::{Disc, Ray, TURNED};
 use super::*;
 use crate::balls::Balls;
 use crate::field::Field;
@@ -23,7 +23,7 @@ fn particles(positions: &[[f32; 3]], radii: &[f32], count: usize) -> SurfacePart
 
 fn discs(particles: &SurfaceParticles) -> Vec<Disc> {
     let fluid = particles.fluid.as_ref().unwrap();
-    particles.particles.iter().filter_map(|particle| Disc::new(fluid, particle, particles.reach)).collect()
+    particles.particles.iter().filter_map(|particle| Disc::new(fluid, particle, particles.reach, TURNED)).collect()
 }
 
 fn view(is_perspective: bool, eye: [f64; 3], clip: [f64; 2]) -> View {
@@ -87,7 +87,7 @@ fn the_disc_of_a_lone_ball_is_its_sphere() {
 
 #[test]
 fn a_ray_meets_the_face_that_looks_at_it_within_the_disc() {
-    let disc = Disc { middle: [0.0, 0.0, 5.0], normal: [0.0, 0.0, -1.0], bend: [0.0; 6], radius: 1.0 };
+    let disc = Disc { middle: [0.0, 0.0, 5.0], normal: [0.0, 0.0, -1.0], bend: [0.0; 6], radius: 1.0, turned: TURNED };
     let ray = |x: f64, start: f64| Ray { start: [x, 0.0, start], direction: [0.0, 0.0, 1.0] };
     let met = |x, inside, clip| disc.meeting(&ray(x, 0.0), inside, clip).map(|meeting| (meeting.distance, meeting.weight));
     assert_eq!(met(0.5, false, [0.1, 9.0]), Some((5.0, 0.5625)));
