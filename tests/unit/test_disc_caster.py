@@ -96,7 +96,7 @@ def test_the_same_balls_are_not_moved_again_for_another_camera():
 
 def test_discs_alone_know_nothing_of_the_surface_between_particles():
     """Few particles lie far apart: exact pictures are on the surface, pictures of the discs are not."""
-    settings = {"particles": 120}
+    settings = {"particles": 70}
     expected = render(method="tile_caster")
     errors = []
     for exact in (True, False):
