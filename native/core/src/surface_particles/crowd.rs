@@ -42,8 +42,6 @@ pub struct Pressure {
     pub force: [f64; 3],
     /// How many there are.
     pub count: usize,
-    /// The least r / h, infinite where there is none.
-    pub nearest: f64,
 }
 
 impl Crowd {
@@ -88,24 +86,40 @@ impl Crowd {
         Ok(crowd)
     }
 
-    /// What the particles that face the same way do at a place of the surface; `own` is the one that is there, if any.
-    pub fn pressure(&self, place: &SurfacePoint, own: Option<usize>) -> Pressure {
-        let mut pressure = Pressure { nearest: f64::INFINITY, ..Pressure::default() };
-        let own = own.map(|particle| particle as u32);
-        let own_reach = self.reach * place.scale;
-        let buckets = self.starts.len() - 1;
+    /// What the particles that face the same way do to one of them.
+    fn pressure(&self, place: &SurfacePoint, own: u32) -> Pressure {
+        let mut pressure = Pressure::default();
         self.levels.for_around(&self.present, place.position, |cell| {
-            let bucket = cell.bucket(buckets);
-            let members = &self.members[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
-            for member in members.iter().filter(|member| member.cell == cell && Some(member.particle) != own) {
-                let offset = difference(place.position, double(member.position));
-                let (squared, reach) = (dot(offset, offset), own_reach.min(f64::from(member.reach)));
-                if squared < reach * reach && dot(place.normal, double(member.normal)) > 0.0 {
-                    pressure.add(offset, squared.sqrt(), reach, own.unwrap_or(member.particle));
+            for member in self.members_of(cell).filter(|member| member.particle != own) {
+                if let Some((offset, squared, reach)) = self.met(place, member, 1.0) {
+                    pressure.add(offset, squared.sqrt(), reach, own);
                 }
             }
         });
         pressure
+    }
+
+    /// Whether a particle that faces the same way is within a share of the reach, up to 1, of a place of the surface.
+    pub fn is_near(&self, place: &SurfacePoint, share: f64) -> bool {
+        self.levels.any_around(&self.present, place.position, |cell| {
+            self.members_of(cell).any(|member| self.met(place, member, share).is_some())
+        })
+    }
+
+    #[inline]
+    fn members_of(&self, cell: LevelCell) -> impl Iterator<Item = &Member> {
+        let bucket = cell.bucket(self.starts.len() - 1);
+        let members = &self.members[self.starts[bucket] as usize..self.starts[bucket + 1] as usize];
+        members.iter().filter(move |member| member.cell == cell)
+    }
+
+    /// The way from a particle to a place that faces the same way and is within a share of its reach; its square, and the reach.
+    #[inline]
+    fn met(&self, place: &SurfacePoint, member: &Member, share: f64) -> Option<([f64; 3], f64, f64)> {
+        let offset = difference(place.position, double(member.position));
+        let (squared, reach) = (dot(offset, offset), (self.reach * place.scale).min(f64::from(member.reach)));
+        let is_met = squared < (share * reach).powi(2) && dot(place.normal, double(member.normal)) > 0.0;
+        is_met.then_some((offset, squared, reach))
     }
 
     /// The pressure on each of the particles.
@@ -117,7 +131,7 @@ impl Crowd {
         // In the order of the cells, whose neighbours are in the cache.
         let found = self.members.par_iter().map(|member| {
             let particle = member.particle as usize;
-            (particle, self.pressure(&places[particle], Some(particle)))
+            (particle, self.pressure(&places[particle], member.particle))
         });
         let mut ordered = memory::with_capacity(places.len())?;
         found.collect_into_vec(&mut ordered);
@@ -140,6 +154,5 @@ impl Pressure {
         self.density += share * share * share;
         self.force = plus(self.force, share * share, direction);
         self.count += 1;
-        self.nearest = self.nearest.min(distance / reach);
     }
 }

@@ -44,12 +44,21 @@ pub struct SurfacePoint {
     pub scale: f64,
 }
 
+/// A ball as a density asks for it, in one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Ball {
+    /// Of the squared influence radius.
+    reciprocal: f64,
+    center: [f32; 3],
+    radius: f32,
+    weight: f32,
+}
+
 /// Moving balls, and which of them reach a point.
 #[derive(Debug)]
 pub struct Fluid {
-    centers: Vec<[f32; 3]>,
-    radii: Vec<f32>,
-    weights: Vec<f32>,
+    balls: Vec<Ball>,
     /// None where nothing moves.
     velocities: Option<Vec<[f32; 3]>>,
     field: Field,
@@ -78,14 +87,12 @@ impl Fluid {
             }
         }
         let hash = BallHash::new(balls.positions(), balls.radii(), cell_share)?;
-        Ok(Self {
-            centers: copied(balls.positions())?,
-            radii: copied(balls.radii())?,
-            weights: copied(balls.weights())?,
-            velocities: velocities.map(copied).transpose()?,
-            field,
-            hash,
-        })
+        let mut packed = memory::with_capacity(balls.len())?;
+        packed.extend((0..balls.len()).map(|ball| {
+            let (center, radius, weight) = (balls.positions()[ball], balls.radii()[ball], balls.weights()[ball]);
+            Ball { reciprocal: f64::from(radius).powi(2).recip(), center, radius, weight }
+        }));
+        Ok(Self { balls: packed, velocities: velocities.map(copied).transpose()?, field, hash })
     }
 
     /// Which balls reach a point.
@@ -95,12 +102,13 @@ impl Fluid {
 
     /// How many balls there are.
     pub fn len(&self) -> usize {
-        self.radii.len()
+        self.balls.len()
     }
 
     /// A ball's centre, influence radius and weight.
     pub fn ball(&self, ball: usize) -> ([f64; 3], f64, f64) {
-        (double(self.centers[ball]), f64::from(self.radii[ball]), f64::from(self.weights[ball]))
+        let Ball { center, radius, weight, .. } = self.balls[ball];
+        (double(center), f64::from(radius), f64::from(weight))
     }
 
     /// The field.
@@ -110,16 +118,18 @@ impl Fluid {
 
     /// Whether a ball takes density away.
     pub fn carves(&self) -> bool {
-        self.weights.iter().any(|weight| *weight < 0.0)
+        self.balls.iter().any(|ball| ball.weight < 0.0)
     }
 
     /// Whether a point is in the fluid.
     pub fn is_inside(&self, point: [f64; 3]) -> bool {
         let mut density = 0.0;
         self.hash.for_near(point, |ball| {
-            let offset = difference(point, double(self.centers[ball]));
-            let x = 1.0 - dot(offset, offset) / f64::from(self.radii[ball]).powi(2);
-            density += f64::from(self.weights[ball]) * self.field.kernel.value(x);
+            let ball = &self.balls[ball];
+            let x = ball.inside(difference(point, double(ball.center)));
+            if x > 0.0 {
+                density += f64::from(ball.weight) * self.field.kernel.value(x);
+            }
         });
         density >= self.field.isovalue
     }
@@ -128,22 +138,23 @@ impl Fluid {
     pub fn sample(&self, point: [f64; 3]) -> Sample {
         let mut sample = Sample::default();
         let (mut velocity, mut lengths, mut curvatures) = ([0.0; 3], 0.0, 0.0);
-        self.hash.for_near(point, |ball| {
-            let radius = f64::from(self.radii[ball]);
-            let offset = difference(point, double(self.centers[ball]));
-            let x = 1.0 - dot(offset, offset) / (radius * radius);
+        self.hash.for_near(point, |index| {
+            let ball = &self.balls[index];
+            let offset = difference(point, double(ball.center));
+            let x = ball.inside(offset);
             if x <= 0.0 {
                 return;
             }
-            let weight = f64::from(self.weights[ball]);
-            let slope = offset.map(|c| -2.0 * weight * self.field.kernel.derivative(x) / (radius * radius) * c);
+            let weight = f64::from(ball.weight);
+            let steepness = -2.0 * weight * self.field.kernel.derivative(x) * ball.reciprocal;
+            let slope = offset.map(|c| steepness * c);
             sample.density += weight * self.field.kernel.value(x);
             sample.gradient = plus(sample.gradient, 1.0, slope);
             let length = dot(slope, slope).sqrt();
             lengths += length;
-            curvatures += length / radius;
+            curvatures += length / f64::from(ball.radius);
             if let Some(velocities) = &self.velocities {
-                let own = double(velocities[ball]);
+                let own = double(velocities[index]);
                 sample.rate -= dot(slope, own);
                 velocity = plus(velocity, length, own);
             }
@@ -203,6 +214,14 @@ impl Fluid {
             position = plus(position, distance.clamp(-longest, longest) / slope, sample.gradient);
         }
         None
+    }
+}
+
+impl Ball {
+    /// The kernel's argument, from the way from the centre.
+    #[inline(always)]
+    fn inside(&self, offset: [f64; 3]) -> f64 {
+        1.0 - dot(offset, offset) * self.reciprocal
     }
 }
 

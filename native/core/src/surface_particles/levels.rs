@@ -13,6 +13,9 @@ const SLACK: f64 = 1.0001;
 /// Levels at most: beyond these all is in the finest cells.
 const MOST: u32 = 60;
 
+/// The steps to a cell's neighbours along an axis.
+const NEAREST_FIRST: [i32; 3] = [0, -1, 1];
+
 /// The sizes of the cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
@@ -45,20 +48,36 @@ impl Levels {
         LevelCell { level, cell: point.map(|coordinate| (coordinate / side).floor() as i32) }
     }
 
-    /// Visits the cells of some levels that hold what may reach a point.
-    pub fn for_around(self, levels: &[u32], point: [f64; 3], mut visit: impl FnMut(LevelCell)) {
-        for level in levels {
+    /// Visits the cells of some levels that hold what may reach a point, on each level that of the point first, until one is found.
+    /// Whether it was.
+    #[inline]
+    pub fn any_around(self, levels: &[u32], point: [f64; 3], mut is_found: impl FnMut(LevelCell) -> bool) -> bool {
+        levels.iter().any(|level| {
             let [x, y, z] = self.cell(*level, point).cell;
-            for step in 0..27i32 {
-                let cell = [x.wrapping_add(step / 9 - 1), y.wrapping_add(step / 3 % 3 - 1), z.wrapping_add(step % 3 - 1)];
-                visit(LevelCell { level: *level, cell });
-            }
-        }
+            NEAREST_FIRST.iter().any(|dx| {
+                NEAREST_FIRST.iter().any(|dy| {
+                    NEAREST_FIRST.iter().any(|dz| {
+                        let cell = [x.wrapping_add(*dx), y.wrapping_add(*dy), z.wrapping_add(*dz)];
+                        is_found(LevelCell { level: *level, cell })
+                    })
+                })
+            })
+        })
+    }
+
+    /// Visits all of these cells.
+    #[inline]
+    pub fn for_around(self, levels: &[u32], point: [f64; 3], mut visit: impl FnMut(LevelCell)) {
+        self.any_around(levels, point, |cell| {
+            visit(cell);
+            false
+        });
     }
 }
 
 impl LevelCell {
     /// Its bucket, of a power of two of them.
+    #[inline]
     pub fn bucket(self, buckets: usize) -> usize {
         let [x, y, z] = self.cell.map(|coordinate| coordinate as u32);
         mixed(mixed(mixed(x) ^ y) ^ z).wrapping_add(self.level.wrapping_mul(0x9e37_79b9)) as usize & (buckets - 1)

@@ -169,11 +169,8 @@ impl SurfaceParticles {
     /// gone then.
     pub fn seed(&mut self, balls: &Balls<'_>, velocities: Option<&[[f32; 3]]>, field: Field, job: &Job) -> Result<Report> {
         let fluid = self.started(balls, velocities, field)?;
-        let area = exposed_area(&fluid, self.options.seed);
-        if area > 0.0 {
-            let points = self.first_points(&fluid, area, job)?;
-            self.add(&points)?;
-        }
+        let points = self.first_points(&fluid, job)?;
+        self.add(&points)?;
         let placed = self.particles.len();
         self.finish_frame(fluid, Report { placed, ..Report::default() }, job)
     }
@@ -194,11 +191,8 @@ impl SurfaceParticles {
         let fluid = self.started(balls, velocities, field)?;
         let points = points.iter().take(self.most());
         let places: Vec<SurfacePoint> = points.filter_map(|point| fluid.projected(double(*point))).collect();
-        let area = exposed_area(&fluid, self.options.seed);
-        if area > 0.0 {
-            // How far apart they will be in the end.
-            self.first_points(&fluid, area, job)?;
-        }
+        // How far apart they will be in the end.
+        self.first_points(&fluid, job)?;
         self.add(&places)?;
         self.finish_frame(fluid, Report { placed: places.len(), ..Report::default() }, job)
     }
@@ -302,13 +296,17 @@ impl SurfaceParticles {
         if self.options.count == 0 { MOST } else { self.options.count }
     }
 
-    /// Places for particles on a surface that has none; `area` is that of the surface or more, in squares of influence radii.
-    fn first_points(&mut self, fluid: &Fluid, area: f64, job: &Job) -> Result<Vec<SurfacePoint>> {
+    /// Places for particles on a surface that has none.
+    fn first_points(&mut self, fluid: &Fluid, job: &Job) -> Result<Vec<SurfacePoint>> {
         let seed = branch(self.options.seed, self.step);
         if self.options.count == 0 {
             self.reach = REACH * FREE_SPACING;
             let points = probes(fluid, FREE_SPACING / PROBES_A_PARTICLE.sqrt(), |_| true, mixed(seed), job)?;
             return evenly(&points, FREE_SPACING, MOST, seed);
+        }
+        let area = exposed_area(fluid, self.options.seed)?;
+        if area == 0.0 {
+            return Ok(Vec::new());
         }
         let spacing = (area / (PROBES_A_PARTICLE * self.options.count as f64)).sqrt();
         let points = probes(fluid, spacing, |_| true, mixed(seed), job)?;
@@ -321,7 +319,7 @@ impl SurfaceParticles {
     fn fill_gaps(&mut self, fluid: &Fluid, job: &Job) -> Result<usize> {
         self.step = self.step.wrapping_add(1);
         let crowd = self.crowd()?;
-        let is_bare = |point: &SurfacePoint| crowd.pressure(point, None).nearest > GAP;
+        let is_bare = |point: &SurfacePoint| !crowd.is_near(point, GAP);
         let seed = branch(self.options.seed, self.step);
         let has_spare = self.options.count > self.particles.len();
         let points = probes(fluid, PROBE_SPACING * self.reach, |point| has_spare || is_bare(point), seed, job)?;

@@ -112,9 +112,7 @@ impl Room {
 
     /// Whether no place near this one is taken on a surface that faces the same way.
     fn has(&self, point: &SurfacePoint) -> bool {
-        let mut is_free = true;
-        self.levels.for_around(&self.present, point.position, |cell| is_free = is_free && self.is_free(cell, point));
-        is_free
+        !self.levels.any_around(&self.present, point.position, |cell| !self.is_free(cell, point))
     }
 
     fn is_free(&self, cell: LevelCell, point: &SurfacePoint) -> bool {
