@@ -8,7 +8,7 @@ uniform float isovalue;
 // How often a point is moved onto the surface, how far at most and how near it must come, in influence radii.
 const int FLUID_PROJECTIONS = 8;
 const float FLUID_LONGEST_PROJECTION = 0.25;
-const float FLUID_NEAR = 1e-3;
+const float FLUID_NEAR = 1e-4;
 
 // What the balls give at a point.
 struct Sample {

@@ -14,8 +14,9 @@ const PROJECTIONS: usize = 8;
 /// A projection goes at most so far, in influence radii: beyond it the slope says nothing.
 const LONGEST_PROJECTION: f64 = 0.25;
 
-/// How near to the surface a point must come, in influence radii.
-const NEAR: f64 = 1e-3;
+/// How near to the surface a point must come before its last step, in influence radii: so far is its normal from that of the surface,
+/// in radians, where this bends by its influence radius.
+const NEAR: f64 = 1e-4;
 
 /// What the balls give at a point.
 #[derive(Clone, Copy, Debug, Default)]

@@ -79,6 +79,50 @@ fn the_hash_finds_each_ball_that_reaches_once() {
 }
 
 #[test]
+fn probes_are_all_over_the_surface() {
+    let random = |index: u32, axis: u32| f64::from(mixed(branch(9, index * 4 + axis))) / f64::from(u32::MAX);
+    let count = 150;
+    let positions: Vec<[f32; 3]> = (0..count).map(|index| [0, 1, 2].map(|axis| 2.0 * random(index, axis) as f32)).collect();
+    let spacing = 0.2;
+    for (greatest, weight) in [(1.0, 1.0), (8.0, 1.0), (1.0, 0.15), (1.0, -0.3)] {
+        let radii: Vec<f32> = (0..count).map(|index| (0.4 * f64::powf(greatest, -random(index, 3))) as f32).collect();
+        // A few are different.
+        let weights: Vec<f32> = (0..count).map(|index| if index % 10 == 0 { weight } else { 1.0 }).collect();
+        let fluid = Fluid::new(&Balls::new(&positions, &radii, &weights).unwrap(), None, field(0.2), 0.5).unwrap();
+        let probes = probes(&fluid, spacing, |_| true, 5, &Job::default()).unwrap();
+        let starts = (0..20_000).map(|index| [4, 5, 6].map(|axis| 2.6 * random(index * 8, axis) - 0.3));
+        let points: Vec<SurfacePoint> = starts.filter_map(|start| fluid.projected(start)).collect();
+        assert!(points.len() > 2000);
+        let is_near = |point: &SurfacePoint, other: &SurfacePoint, share: f64| {
+            let offset = difference(point.position, other.position);
+            dot(offset, offset) < (share * point.scale.min(other.scale)).powi(2) && dot(point.normal, other.normal) > 0.0
+        };
+        let is_bare = |point: &&SurfacePoint| !probes.iter().any(|probe| is_near(point, probe, GAP / PROBE_SPACING * spacing));
+        let bare = points.par_iter().filter(is_bare).count();
+        // But small cavities, which are seen from nowhere.
+        assert!(bare * 300 <= points.len(), "{bare} of {} where the sizes are {greatest} and weights {weight}", points.len());
+    }
+}
+
+#[test]
+fn a_surface_is_probed_by_the_balls_that_are_next_to_it() {
+    let fluid = |positions: &[[f32; 3]]| {
+        let ones = vec![1.0; positions.len()];
+        Fluid::new(&Balls::new(positions, &ones, &ones).unwrap(), None, field(0.2), 0.5).unwrap()
+    };
+    let radius = field(0.2).kernel_radius_share(1.0);
+    let sphere = 4.0 * std::f64::consts::PI * radius * radius;
+    assert!((exposed_area(&fluid(&[[0.0; 3], [5.0, 0.0, 0.0]]), 3).unwrap() / (2.0 * sphere) - 1.0).abs() < 1e-3);
+    // A cube of 9^3 balls; were all of them asked that reach the surface, this would be met several times as often.
+    let apart = 0.7;
+    let place = |index: i32| [index % 9, index / 9 % 9, index / 81].map(|cell| apart * cell as f32);
+    let cube = fluid(&(0..729).map(place).collect::<Vec<_>>());
+    let side = 8.0 * f64::from(apart) + 2.0 * radius;
+    let area = exposed_area(&cube, 3).unwrap() / (6.0 * side * side);
+    assert!((0.9..1.6).contains(&area), "{area}");
+}
+
+#[test]
 fn particles_go_with_what_moves_and_keep_their_numbers() {
     let (positions, radii, weights) = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [1.0, 1.2], [1.0, 1.0]);
     let velocities = [[1.0, -2.0, 0.5]; 2];
