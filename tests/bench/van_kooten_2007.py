@@ -20,6 +20,7 @@ from meniscus.gpu_shaders.methods.surface_particles.crowds import Crowd, GridCro
 from meniscus.gpu_shaders.methods.surface_particles.state import ParticleState, Pressures
 
 from . import machine, report
+from .scenes import SCENES
 from .timing import ALL, Plan, interleave, statistics_by_stage, timed
 from .van_kooten_scenes import FIELD, GLASS_REACH, GLASS_SPACING, cylinder, cylinder_start, fountain, glass
 
@@ -38,6 +39,8 @@ QUERY_SIZES = (1.1, 1.6, 2.2, 3.0, 4.0)
 """How far neighbours are looked for, in distances between neighbours of an even spread."""
 FOUNTAIN_FRAMES, FOUNTAIN_EVERY = 100, 20
 FOUNTAIN_STEPS = 10
+COUNTS = (0, COUNT, 131_072, 1_000_000)
+COUNT_FRAMES = 3
 COLORS = 128
 INK, GRID, LINES = "#202020", "#dddddd", {"repulsion": "#c8261e", "repulsion and dispersion": "#2f6cb0"}
 PLOT_SIZE, FINER = (640, 320), 3
@@ -55,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
         return
     about = machine.describe() | {"gl_renderer": shared_context().renderer}
     print(about["warning"], flush=True)
-    text = "\n\n".join([report.machine_text(about), query_table(Plan(options.repeats)), fountain_table()])
+    text = "\n\n".join([report.machine_text(about), query_table(Plan(options.repeats)), fountain_table(), count_table()])
     report.publish(NAME, {"machine": about, "text": text}, text, options.update_docs, PAGE)
 
 
@@ -116,6 +119,28 @@ def fountain_table() -> str:
         "ms a frame",
     ]
     return report.table(headers, [[str(cell) for cell in row] for row in rows])
+
+
+def count_table() -> str:
+    """How long many particles take, on the CPU."""
+    scene = SCENES["dam_break"]
+    balls = scene.make_balls()
+    rows = []
+    for count in COUNTS:
+        particles = meniscus.SurfaceParticles(count)
+        seconds = [_seconds(partial(particles.seed, balls, scene.field))]
+        seconds += [_seconds(partial(particles.follow, balls, scene.field, 0.0)) for _ in range(COUNT_FRAMES)]
+        rows.append(
+            [str(len(particles.cloud.ids)), *(report.milliseconds(1e3 * each) for each in (seconds[0], min(seconds[1:])))]
+        )
+        print(rows[-1], flush=True)
+    return report.table(["particles", "to place, ms", "a frame, ms"], rows)
+
+
+def _seconds(action: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    action()
+    return time.perf_counter() - start
 
 
 def seeded(balls: meniscus.Balls, count: int) -> meniscus.SurfaceParticles:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 # The test run tries the same cases each time; `make fuzz` asks for other ones, and more.
 CASES = int(os.environ.get("MENISCUS_FUZZ_CASES", "0"))
-EFFORT: dict[str, Any] = {"max_examples": CASES} if CASES else {"max_examples": 300, "derandomize": True}
+EFFORT: dict[str, Any] = {"max_examples": CASES} if CASES else {"max_examples": 200, "derandomize": True}
 
 EXPECTED = (TypeError, ValueError, OverflowError, MemoryError)
 
